@@ -17,6 +17,7 @@ use super::geometric::{Loads, Motion, Start};
 use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
+use super::line::Placed;
 use super::look::Look;
 use super::passing::Passing;
 use super::problem::{Minimum, Problem};
@@ -287,29 +288,33 @@ impl Newton {
         gap: Gap,
         guess: Guess<'_>,
     ) -> Minimum {
-        let local = |mut row: Row| {
-            for (body, _) in row.sides.iter_mut().flatten() {
-                // Every free body of an island's rows is in `island.bodies`, which is sorted.
-                *body = island.bodies.partition_point(|b| b < body);
-            }
-            let gap = match gap {
-                Gap::Position => {
-                    if row.resistance == Resistance::Parting {
-                        row = row.parting();
-                    }
-                    row.gap
-                }
-                Gap::Relaxed => row.relaxed_gap,
+        // Rows that part bodies in place of those that were found.
+        let mut parting = Vec::new();
+        if matches!(gap, Gap::Position) {
+            let parts = island.rows.iter().map(|&k| &rows[k]).filter(|row| row.resistance == Resistance::Parting);
+            parting.extend(parts.map(Row::parting));
+        }
+        let mut parting = parting.iter();
+        let place = |row: &Row| {
+            // Every free body of an island's rows is in `island.bodies`, which is sorted.
+            row.sides.map(|side| side.map(|(body, _)| island.bodies.partition_point(|b| *b < body)))
+        };
+        let placed = |&k: &usize| {
+            let row = &rows[k];
+            let (row, gap) = match (gap, row.resistance) {
+                (Gap::Position, Resistance::Parting) => (parting.next().unwrap_or(row), row.gap),
+                (Gap::Position, _) => (row, row.gap),
+                (Gap::Relaxed, _) => (row, row.relaxed_gap),
             };
-            (row, gap)
+            Placed { row, bodies: place(row), gap, resistance: row.resistance }
         };
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
         let inertia: Vec<_> = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
-        let rows: Vec<_> = island.rows.iter().map(|&k| local(rows[k].clone())).collect();
+        let placed: Vec<_> = island.rows.iter().map(placed).collect();
         let of_rows = |forces: &[RowForce]| island.rows.iter().map(|&k| forces[k]).collect::<Vec<_>>();
         let (start, forces) = (of(guess.velocities), guess.forces.map(of_rows));
-        let asked = rows.iter().map(|(_, gap)| gap.abs() / step.h).fold(0.0, f64::max);
-        let problem = Problem::new(inertia, of(&motion.target), rows, step.h);
+        let asked = placed.iter().map(|placed| placed.gap.abs() / step.h).fold(0.0, f64::max);
+        let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
         let minimum = problem.minimise(start.clone(), forces.as_deref());
         match self.is_wild(step, island, asked, [&of(&motion.target), &start], &minimum.velocity) {
             true => Minimum { converged: false, ..problem.softened().minimise(start, None) },

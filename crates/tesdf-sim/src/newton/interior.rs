@@ -23,29 +23,31 @@
 //! Kaufman et al., *Staggered projections for frictional contact in multibody systems*, 2008).
 mod iteration;
 
-use iteration::Run;
+use iteration::Iterate;
 use nalgebra::Vector6;
 
-use super::line::{Bodies, Force, Line, Slip};
+use super::lanes::Lanes;
+use super::line::{Bodies, Bundle, Forces, Lines, Slips};
 use super::linear::Pattern;
 
 /// Bodies and the rows between them.
 pub struct Interior<'a> {
     pub bodies: &'a Bodies,
     pub pattern: &'a Pattern,
-    pub lines: Vec<&'a Line>,
+    pub lines: &'a Lines,
 }
 
 /// Velocities and forces that were found.
 #[derive(Clone, Debug)]
 pub struct Solution {
     pub velocity: Vec<Vector6<f64>>,
-    pub forces: Vec<Force>,
+    /// Of each bundle.
+    pub forces: Vec<Forces>,
     /// Number of factorisations.
     pub iterations: u32,
     pub converged: bool,
     /// The fixed limits of friction; empty where they follow from the pushes.
-    limits: Vec<f64>,
+    limits: Vec<Lanes>,
 }
 
 /// What limits friction.
@@ -55,17 +57,19 @@ enum Limits {
     Coulomb,
     /// The push of the iterate before; once the iterates are near, that of then.
     Lagged,
-    /// These, in the units of the slips.
-    Fixed(Vec<f64>),
+    /// These, in the units of the slips, of each bundle.
+    Fixed(Vec<Lanes>),
 }
 
 impl Limits {
-    /// That of row `k` with this push.
-    fn of(&self, k: usize, slip: &Slip, push: f64) -> f64 {
-        match self {
-            Self::Fixed(limits) => limits[k].max(f64::EPSILON * f64::EPSILON),
+    /// Those of bundle `k` with these pushes. They are not zero.
+    #[inline(always)]
+    fn of(&self, k: usize, slip: &Slips, push: Lanes) -> Lanes {
+        let limits = match self {
+            Self::Fixed(limits) => limits[k],
             Self::Coulomb | Self::Lagged => slip.coefficient * push,
-        }
+        };
+        limits.max(Lanes::splat(f64::EPSILON * f64::EPSILON))
     }
 }
 
@@ -112,27 +116,28 @@ const WIDTHS: [f64; 2] = [1e-10, 1e-12];
 
 impl Interior<'_> {
     /// The solution, from velocities and forces that may be nearly right.
-    pub fn solve(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Force>)>) -> Solution {
-        if self.lines.iter().all(|line| line.violation(&self.bodies.target) == 0.0) {
-            let (velocity, forces) = (self.bodies.target.to_vec(), vec![Force::default(); self.lines.len()]);
+    pub fn solve(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Forces>)>) -> Solution {
+        if self.greatest_violation() == 0.0 {
+            let (velocity, forces) =
+                (self.bodies.target.to_vec(), vec![Forces::default(); self.lines.bundles.len()]);
             return Solution { velocity, forces, iterations: 0, converged: true, limits: Vec::new() };
         }
         let mut iterations = 0;
         if let Some((velocity, forces)) = guess.filter(|(v, forces)| self.misfit(v, forces) < NEARLY) {
             let centre = self.centre_of(&velocity, &forces);
-            let found = Run::from(self, velocity, &forces, centre).descend(Limits::Coulomb, WARM);
+            let found = Iterate::from(self, velocity, &forces, centre).descend(Limits::Coulomb, WARM);
             iterations += found.iterations;
             if found.converged {
                 return found;
             }
         }
         let has_friction = self.has_friction();
-        let mut found = Run::cold(self).descend(Limits::Coulomb, if has_friction { COLD } else { CONVEX });
+        let mut found = Iterate::cold(self).descend(Limits::Coulomb, if has_friction { COLD } else { CONVEX });
         iterations += found.iterations;
         if found.converged || !has_friction {
             return Solution { iterations, ..found };
         }
-        found = Run::cold(self).descend(Limits::Lagged, LAGGED);
+        found = Iterate::cold(self).descend(Limits::Lagged, LAGGED);
         iterations += found.iterations;
         let mut corrections = 0;
         while self.lag(&found) >= LAG {
@@ -144,7 +149,7 @@ impl Interior<'_> {
             let limits = Limits::Fixed(self.limits(&found.forces));
             let centre = self.mean_square(CORRECTED_FROM);
             let before = found.velocity.clone();
-            found = Run::from(self, found.velocity, &found.forces, centre).descend(limits, LAGGED);
+            found = Iterate::from(self, found.velocity, &found.forces, centre).descend(limits, LAGGED);
             iterations += found.iterations;
             let change: Vec<_> = found.velocity.iter().zip(&before).map(|(a, b)| a - b).collect();
             if self.way(&change) < STILL {
@@ -155,7 +160,24 @@ impl Interior<'_> {
     }
 
     fn has_friction(&self) -> bool {
-        self.lines.iter().any(|line| line.slip.is_some())
+        self.lines.bundles.iter().any(|bundle| bundle.slip.is_some())
+    }
+
+    /// Each bundle with its number and the velocity of its group.
+    fn bundles<'b>(
+        &'b self,
+        velocity: &'b [Vector6<f64>],
+    ) -> impl Iterator<Item = (usize, &'b Bundle, [f64; 6])> + 'b {
+        self.lines.batches.iter().flat_map(move |batch| {
+            let relative = self.lines.groups[batch.group].of(velocity);
+            batch.bundles.clone().map(move |k| (k, &self.lines.bundles[k], relative))
+        })
+    }
+
+    /// The greatest gap that is to be closed.
+    fn greatest_violation(&self) -> f64 {
+        let of_bundle = |(_, bundle, relative): (usize, &Bundle, [f64; 6])| bundle.violation(&relative);
+        self.bundles(&self.bodies.target).map(of_bundle).fold(0.0, f64::max)
     }
 
     /// Bound of the way of a point of a body in the step, m.
@@ -185,24 +207,27 @@ impl Interior<'_> {
     }
 
     /// The limits of friction that follow from the pushes.
-    fn limits(&self, forces: &[Force]) -> Vec<f64> {
-        let limit = |(line, force): (&&Line, &Force)| {
-            line.slip.as_ref().map_or(0.0, |slip| slip.coefficient * force.push)
+    fn limits(&self, forces: &[Forces]) -> Vec<Lanes> {
+        let limit = |(bundle, forces): (&Bundle, &Forces)| {
+            bundle.slip.as_ref().map_or(Lanes::ZERO, |slip| slip.coefficient * forces.push)
         };
-        self.lines.iter().zip(forces).map(limit).collect()
+        self.lines.bundles.iter().zip(forces).map(limit).collect()
     }
 
     /// How far fixed limits of friction, where they matter, are from μ × push, as a share of all.
     fn lag(&self, at: &Solution) -> f64 {
         let (mut excess, mut all) = (0.0, f64::MIN_POSITIVE);
-        for (((line, force), due), limit) in
-            self.lines.iter().zip(&at.forces).zip(self.limits(&at.forces)).zip(&at.limits)
+        let limits = self.limits(&at.forces);
+        for (((bundle, forces), due), limit) in
+            self.lines.bundles.iter().zip(&at.forces).zip(&limits).zip(&at.limits)
         {
-            if let Some(slip) = &line.slip {
-                let size = force.friction[0].hypot(force.friction[1]);
+            let Some(slip) = &bundle.slip else { continue };
+            for lane in 0..bundle.rows().len() {
+                let [due, limit, scale] = [due, limit, &slip.scale].map(|lanes| lanes.0[lane]);
+                let size = forces.friction[0].0[lane].hypot(forces.friction[1].0[lane]);
                 let slides = size > 0.999 * limit;
-                excess += slip.scale * if slides { (due - limit).abs() } else { (size - due).max(0.0) };
-                all += slip.scale * due;
+                excess += scale * if slides { (due - limit).abs() } else { (size - due).max(0.0) };
+                all += scale * due;
             }
         }
         excess / all
@@ -210,33 +235,53 @@ impl Interior<'_> {
 
     /// The mean square of a gap of `gap` metres over all bounds, in the units of the rows.
     fn mean_square(&self, gap: f64) -> f64 {
-        let square = |line: &&Line| line.count_bounds() as f64 * (gap * line.scale).powi(2);
-        self.lines.iter().map(square).sum::<f64>() / self.count_bounds().max(1) as f64
+        let square = |bundle: &Bundle| {
+            let of_row =
+                |lane: usize| bundle.count_bounds(lane) as f64 * (gap * bundle.scale.0[lane]).powi(2);
+            (0..bundle.rows().len()).map(of_row).sum::<f64>()
+        };
+        self.lines.bundles.iter().map(square).sum::<f64>() / self.count_bounds().max(1) as f64
     }
 
     fn count_bounds(&self) -> usize {
-        self.lines.iter().map(|line| line.count_bounds()).sum()
+        let of_bundle =
+            |bundle: &Bundle| (0..bundle.rows().len()).map(|k| bundle.count_bounds(k)).sum::<usize>();
+        self.lines.bundles.iter().map(of_bundle).sum()
     }
 
     /// How far velocities and forces are from a solution without friction's law, m.
-    fn misfit(&self, velocity: &[Vector6<f64>], forces: &[Force]) -> f64 {
+    fn misfit(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> f64 {
         let mut momentum = self.lack(velocity);
         let mut worst = 0.0;
-        for (line, force) in self.lines.iter().zip(forces) {
-            line.act(force.push, force.friction, &mut momentum);
-            // A force is right when a spring that keeps it finds it again.
-            let again = (force.push - line.at(velocity)).max(line.bounds[0]).min(line.bounds[1]);
-            worst = greater((again - force.push).abs() / line.scale, worst);
+        for batch in &self.lines.batches {
+            let group = &self.lines.groups[batch.group];
+            let (relative, mut acting) = (group.of(velocity), [Lanes::ZERO; 6]);
+            for k in batch.bundles.clone() {
+                let (bundle, forces) = (&self.lines.bundles[k], &forces[k]);
+                bundle.act(forces.push, forces.friction, &mut acting);
+                // A force is right when a spring that keeps it finds it again.
+                let again = forces.push - bundle.at(&relative);
+                for lane in 0..bundle.rows().len() {
+                    let [low, high] = bundle.bounds.map(|bound| bound.0[lane]);
+                    let off = again.0[lane].max(low).min(high) - forces.push.0[lane];
+                    worst = greater(off.abs() / bundle.scale.0[lane], worst);
+                }
+            }
+            group.act(acting.map(Lanes::sum), &mut momentum);
         }
         greater(self.way_of_momentum(&momentum), worst)
     }
 
     /// ν for velocities and forces that are nearly right.
-    fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Force]) -> f64 {
-        let bounded = self.lines.iter().zip(forces).filter(|(line, _)| line.count_bounds() > 0);
-        let (products, count) = bounded.fold((0.0, 0.0), |(sum, count), (line, force)| {
-            (sum + (line.at(velocity) * force.push).abs(), count + 1.0)
-        });
+    fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> f64 {
+        let (mut products, mut count) = (0.0, 0.0);
+        for (k, bundle, relative) in self.bundles(velocity) {
+            let product = bundle.at(&relative) * forces[k].push;
+            for lane in (0..bundle.rows().len()).filter(|&lane| bundle.count_bounds(lane) > 0) {
+                products += product.0[lane].abs();
+                count += 1.0;
+            }
+        }
         FIRST_WARM * f64::max(products / f64::max(count, 1.0), self.mean_square(LEAST_WARM))
     }
 }

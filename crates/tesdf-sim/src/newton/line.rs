@@ -1,11 +1,19 @@
-//! A row as the interior point method sees it: in units of its own, with its friction.
+//! Rows as the interior point method sees them: in units of their own, with their friction, and in
+//! bundles of four that share their bodies.
+//!
+//! All rows of a pair of bodies act on the motion of one body relative to the other, so they are
+//! summed up for it, and the sum is passed on to the two bodies.
 use std::array;
+use std::collections::BTreeMap;
+use std::ops::Range;
 
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
 use super::integrate::pack;
-use super::linear::{Sides, dot};
+use super::lanes::{Lanes, WIDTH};
+use super::linear::Pattern;
+use super::relative::Relative;
 use super::rows::{Resistance, Row, RowForce};
 
 /// Rigid rows give way by this share of the way by which their force would move their bodies in the
@@ -14,49 +22,9 @@ use super::rows::{Resistance, Row, RowForce};
 /// gave way by 25 pm, enough for contacts at the bottom of a bend to let go.
 const RIGID: f64 = 1e-12;
 
-/// A row in units in which a force of 1 changes its rate by 1 in the step: the gap is multiplied by
-/// `k = 1 / (h √w)` with `w = J M⁻¹ Jᵀ`, and the force divided by it. Both are then √J.
-#[derive(Clone, Debug)]
-pub struct Line {
-    /// The derivative of the gap by the velocities.
-    pub sides: Sides<1>,
-    /// The index of its two bodies in the pattern of the matrix.
-    pub pair: Option<usize>,
-    /// The gap at the end of the step when the velocities are zero.
-    pub gap: f64,
-    /// The gap that is left, divided by the force.
-    pub compliance: f64,
-    /// The least and the greatest force.
-    pub bounds: [f64; 2],
-    /// k
-    pub scale: f64,
-    /// Friction of a contact.
-    pub slip: Option<Box<Slip>>,
-}
-
-/// Friction in units of its own, with the mean of `w` over two tangents.
-#[derive(Clone, Debug)]
-pub struct Slip {
-    /// Unit vectors.
-    pub tangents: [DVec3; 2],
-    /// The derivatives of the gap in units of the row, and of the ways along the tangents, by the
-    /// velocities.
-    pub sides: Sides<3>,
-    /// The ways when the velocities are zero.
-    pub way: [f64; 2],
-    /// μ, for these units.
-    pub coefficient: f64,
-    /// k of the ways.
-    pub scale: f64,
-}
-
-/// What acts along a row, in its units.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Force {
-    pub push: f64,
-    /// On the first side, along the tangents.
-    pub friction: [f64; 2],
-}
+/// Rows are of one group when the vectors between the centres of their bodies differ by less than
+/// this share of the smaller body. They differ where rows are from poses at different times.
+const SAME_OFFSET: f64 = 1e-9;
 
 /// The bodies of an island, in a step.
 #[derive(Clone, Debug)]
@@ -73,6 +41,78 @@ pub struct Bodies {
     pub time_step: f64,
 }
 
+/// A row of an island.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'a> {
+    pub row: &'a Row,
+    /// The index of the body of each side in the island.
+    pub bodies: [Option<usize>; 2],
+    /// The gap at the end of the step when the velocities are zero, m or rad.
+    pub gap: f64,
+    pub resistance: Resistance,
+}
+
+/// Four rows of a group. Each has units in which a force of 1 changes its rate by 1 in the step: the
+/// gap is multiplied by `k = 1 / (h √w)` with `w = J M⁻¹ Jᵀ`, and the force divided by it. Both are
+/// then √J. Missing rows have no derivatives, no gap and no bounds, so nothing acts along them.
+#[derive(Clone, Debug)]
+pub struct Bundle {
+    /// The numbers of its rows in the island; one to four.
+    rows: [usize; WIDTH],
+    count: usize,
+    /// The derivatives of the gap by the relative velocity of the group.
+    pub normal: [Lanes; 6],
+    pub gap: Lanes,
+    /// The gap that is left, divided by the force.
+    pub compliance: Lanes,
+    /// The least and the greatest force.
+    pub bounds: [Lanes; 2],
+    /// k
+    pub scale: Lanes,
+    /// Friction, if its rows have it.
+    pub slip: Option<Slips>,
+}
+
+/// Friction in units of its own, with the mean of `w` over two tangents.
+#[derive(Clone, Debug)]
+pub struct Slips {
+    /// The derivatives of the ways along two tangents by the relative velocity.
+    pub tangents: [[Lanes; 6]; 2],
+    /// The ways when the velocities are zero.
+    pub way: [Lanes; 2],
+    /// μ, for these units.
+    pub coefficient: Lanes,
+    /// k of the ways.
+    pub scale: Lanes,
+}
+
+/// What acts along the rows of a bundle, in their units.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Forces {
+    pub push: Lanes,
+    /// Along the tangents.
+    pub friction: [Lanes; 2],
+}
+
+/// Bundles of one group, all with friction or all without.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    pub group: usize,
+    /// Whether they have friction.
+    pub slips: bool,
+    pub bundles: Range<usize>,
+}
+
+/// Rows in bundles.
+#[derive(Clone, Debug, Default)]
+pub struct Lines {
+    pub groups: Vec<Relative>,
+    pub batches: Vec<Batch>,
+    pub bundles: Vec<Bundle>,
+    /// The groups of each pair of bodies; of a single body, with itself.
+    of_pair: BTreeMap<(usize, usize), Vec<usize>>,
+}
+
 impl Bodies {
     /// `1 / (h √w)`
     fn scale(&self, weight: f64) -> f64 {
@@ -85,118 +125,226 @@ impl Bodies {
     }
 }
 
-impl Line {
-    /// The line of `row` with this gap, whose two bodies are this pair of the pattern.
-    pub fn new(row: &Row, gap: f64, pair: Option<usize>, bodies: &Bodies) -> Self {
-        let scale = bodies.scale(bodies.weight(&row.sides));
-        let scaled = |j: Vector6<f64>, scale: f64| j * (bodies.time_step * scale);
-        let slip = row.friction.map(|friction| {
-            let tangents: [DVec3; 2] = friction.normal.any_orthonormal_pair().into();
-            let side = |k: usize, t: DVec3| {
-                let sign = if k == 0 { 1.0 } else { -1.0 };
-                row.sides[k].map(|(body, _)| (body, sign * pack(t, row.arms[k].cross(t))))
-            };
-            let along = tangents.map(|t| [side(0, t), side(1, t)]);
-            let of_slip = bodies.scale(along.iter().map(|sides| bodies.weight(sides)).sum::<f64>() / 2.0);
-            let sides = array::from_fn(|k| {
-                let ((body, normal), (_, x), (_, y)) = (row.sides[k]?, along[0][k]?, along[1][k]?);
-                Some((body, [scaled(normal, scale), scaled(x, of_slip), scaled(y, of_slip)]))
-            });
-            Box::new(Slip {
-                tangents,
-                sides,
-                way: tangents.map(|t| of_slip * t.dot(friction.way)),
-                coefficient: friction.coefficient * scale / of_slip,
-                scale: of_slip,
-            })
-        });
-        let compliance = match row.resistance {
-            Resistance::Rigid => RIGID,
-            Resistance::Spring | Resistance::Parting => scale * scale / row.stiffness,
+impl Placed<'_> {
+    /// The gap at the end of the step at these velocities, m or rad.
+    pub fn at(&self, velocity: &[Vector6<f64>], time_step: f64) -> f64 {
+        let rate = |(side, body): (&Option<(usize, Vector6<f64>)>, &Option<usize>)| match (side, body) {
+            (Some((_, j)), Some(body)) => j.dot(&velocity[*body]),
+            _ => 0.0,
         };
-        Self {
-            sides: row.sides.map(|side| side.map(|(body, j)| (body, [scaled(j, scale)]))),
-            pair,
-            gap: scale * gap,
-            compliance,
-            bounds: row.bounds.map(|force| force / scale),
-            scale,
-            slip,
+        self.gap + time_step * self.row.sides.iter().zip(&self.bodies).map(rate).sum::<f64>()
+    }
+
+    /// The derivatives by the velocities of the bodies of the island.
+    fn sides(&self) -> [Option<(usize, Vector6<f64>)>; 2] {
+        array::from_fn(|k| Some((self.bodies[k]?, self.row.sides[k]?.1)))
+    }
+
+    /// The side whose velocity, relative to the other one, counts: that of the smaller body, near
+    /// which the numbers of both are exact.
+    fn reference(&self, bodies: &Bodies) -> usize {
+        match self.bodies {
+            [Some(a), Some(b)] => usize::from(bodies.levers[b] < bodies.levers[a]),
+            [None, _] => 1,
+            [_, None] => 0,
         }
-    }
-
-    /// Number of bounds of its force.
-    pub fn count_bounds(&self) -> usize {
-        self.bounds.iter().filter(|bound| bound.is_finite()).count()
-    }
-
-    /// The gap at the end of the step at these velocities.
-    #[inline]
-    pub fn at(&self, velocity: &[Vector6<f64>]) -> f64 {
-        self.gap + self.change(velocity)
-    }
-
-    /// What velocities add to the gap.
-    #[inline]
-    pub fn change(&self, velocity: &[Vector6<f64>]) -> f64 {
-        self.sides.iter().flatten().map(|(body, j)| dot(&j[0], &velocity[*body])).sum()
-    }
-
-    /// How far the gap at these velocities is from one that needs no force.
-    pub fn violation(&self, velocity: &[Vector6<f64>]) -> f64 {
-        let gap = self.at(velocity);
-        match self.bounds {
-            [0.0, _] => (-gap).max(0.0),
-            [_, 0.0] => gap.max(0.0),
-            _ => gap.abs(),
-        }
-    }
-
-    /// Adds the momentum that a push and a friction give in the step.
-    #[inline]
-    pub fn act(&self, push: f64, friction: [f64; 2], to: &mut [Vector6<f64>]) {
-        let add = |to: &mut Vector6<f64>, j: &Vector6<f64>, force: f64| {
-            for (to, j) in to.data.0[0].iter_mut().zip(&j.data.0[0]) {
-                *to += j * force;
-            }
-        };
-        for (body, j) in self.sides.iter().flatten() {
-            add(&mut to[*body], &j[0], push);
-        }
-        if let Some(slip) = &self.slip {
-            for (body, [_, x, y]) in slip.sides.iter().flatten() {
-                add(&mut to[*body], x, friction[0]);
-                add(&mut to[*body], y, friction[1]);
-            }
-        }
-    }
-
-    /// A force in the units of the line.
-    pub fn of_force(&self, force: &RowForce) -> Force {
-        let friction = self
-            .slip
-            .as_ref()
-            .map_or([0.0; 2], |slip| slip.tangents.map(|t| t.dot(force.friction) / slip.scale));
-        Force { push: force.along / self.scale, friction }
-    }
-
-    /// A force in N or N m.
-    pub fn to_force(&self, force: &Force) -> RowForce {
-        let friction = self.slip.as_ref().map_or(DVec3::ZERO, |slip| {
-            let [x, y] = slip.tangents;
-            slip.scale * (force.friction[0] * x + force.friction[1] * y)
-        });
-        RowForce { along: force.push * self.scale, friction }
     }
 }
 
-impl Slip {
-    /// What velocities add to the ways.
-    #[inline]
-    pub fn change(&self, velocity: &[Vector6<f64>]) -> [f64; 2] {
-        self.sides.iter().flatten().fold([0.0; 2], |[x, y], (body, j)| {
-            let v = &velocity[*body];
-            [x + dot(&j[1], v), y + dot(&j[2], v)]
-        })
+impl Lines {
+    /// Adds rows, each with its number.
+    pub fn add<'a>(
+        &mut self,
+        rows: impl Iterator<Item = (usize, Placed<'a>)>,
+        bodies: &Bodies,
+        pattern: &Pattern,
+    ) {
+        let mut placed: Vec<_> = rows
+            .map(|(k, row)| {
+                let reference = row.reference(bodies);
+                (self.group(&row, reference, bodies, pattern), row.row.friction.is_some(), k, row, reference)
+            })
+            .collect();
+        placed.sort_by_key(|&(group, slips, ..)| (group, slips));
+        for batch in placed.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let first = self.bundles.len();
+            for four in batch.chunks(WIDTH) {
+                let mut bundle = Bundle::new(batch[0].1);
+                for &(.., k, row, reference) in four {
+                    bundle.push(k, &row, reference, bodies);
+                }
+                self.bundles.push(bundle);
+            }
+            let (group, slips, ..) = batch[0];
+            self.batches.push(Batch { group, slips, bundles: first..self.bundles.len() });
+        }
+    }
+
+    /// The group of a row.
+    fn group(&mut self, row: &Placed<'_>, reference: usize, bodies: &Bodies, pattern: &Pattern) -> usize {
+        // One of the sides has a body.
+        let body = row.bodies[reference].unwrap_or_default();
+        let other = row.bodies[1 - reference];
+        let offset =
+            other.map_or(DVec3::ZERO, |_| row.row.arms[1 - reference] - row.row.arms[reference]);
+        let is_same = |group: &Relative| {
+            group.body == body
+                && group.other.map(|other| other.body) == other
+                && group.offset.distance(offset) <= SAME_OFFSET * bodies.levers[body]
+        };
+        // Rows of a pair come together.
+        if let Some(last) = self.groups.len().checked_sub(1).filter(|&last| is_same(&self.groups[last])) {
+            return last;
+        }
+        let of_pair = self.of_pair.entry((body, other.unwrap_or(body))).or_default();
+        if let Some(&group) = of_pair.iter().find(|&&group| is_same(&self.groups[group])) {
+            return group;
+        }
+        of_pair.push(self.groups.len());
+        self.groups.push(Relative::new(body, other, offset, pattern));
+        self.groups.len() - 1
+    }
+
+    /// Forces of rows, by their numbers, in their bundles.
+    pub fn forces<'a>(&self, of_row: impl Fn(usize) -> (&'a Row, RowForce)) -> Vec<Forces> {
+        let of_bundle = |bundle: &Bundle| {
+            let mut forces = Forces::default();
+            for (lane, &k) in bundle.rows().iter().enumerate() {
+                let (row, force) = of_row(k);
+                forces.push.0[lane] = force.along / bundle.scale.0[lane];
+                if let (Some(slip), Some(friction)) = (&bundle.slip, &row.friction) {
+                    let along = tangents(friction.normal).map(|t| t.dot(force.friction) / slip.scale.0[lane]);
+                    forces.friction.iter_mut().zip(along).for_each(|(to, along)| to.0[lane] = along);
+                }
+            }
+            forces
+        };
+        self.bundles.iter().map(of_bundle).collect()
+    }
+}
+
+/// The directions of friction.
+fn tangents(normal: DVec3) -> [DVec3; 2] {
+    normal.any_orthonormal_pair().into()
+}
+
+impl Bundle {
+    fn new(slips: bool) -> Self {
+        let none = [Lanes::ZERO; 6];
+        let one = Lanes::splat(1.0);
+        let slip = slips.then_some(Slips {
+            tangents: [none; 2],
+            way: [Lanes::ZERO; 2],
+            coefficient: Lanes::ZERO,
+            scale: one,
+        });
+        let bounds = [Lanes::splat(f64::NEG_INFINITY), Lanes::splat(f64::INFINITY)];
+        let (gap, compliance) = (Lanes::ZERO, one);
+        Self { rows: [0; WIDTH], count: 0, normal: none, gap, compliance, bounds, scale: one, slip }
+    }
+
+    /// The numbers of its rows.
+    pub fn rows(&self) -> &[usize] {
+        &self.rows[..self.count]
+    }
+
+    /// Adds a row to less than four.
+    fn push(&mut self, number: usize, placed: &Placed<'_>, reference: usize, bodies: &Bodies) {
+        let (lane, row, h) = (self.count, placed.row, bodies.time_step);
+        self.rows[lane] = number;
+        self.count += 1;
+        let set = |to: &mut [Lanes; 6], j: Option<(usize, Vector6<f64>)>, scale: f64| {
+            if let Some((_, j)) = j {
+                to.iter_mut().zip(&j.data.0[0]).for_each(|(to, j)| to.0[lane] = h * scale * j);
+            }
+        };
+        let sides = placed.sides();
+        let scale = bodies.scale(bodies.weight(&sides));
+        set(&mut self.normal, sides[reference], scale);
+        self.gap.0[lane] = scale * placed.gap;
+        self.compliance.0[lane] = match placed.resistance {
+            Resistance::Rigid => RIGID,
+            Resistance::Spring | Resistance::Parting => scale * scale / row.stiffness,
+        };
+        self.bounds.iter_mut().zip(row.bounds).for_each(|(to, bound)| to.0[lane] = bound / scale);
+        self.scale.0[lane] = scale;
+        if let (Some(slip), Some(friction)) = (&mut self.slip, &row.friction) {
+            let along = tangents(friction.normal).map(|t| {
+                let side = |k: usize, sign: f64| Some((placed.bodies[k]?, sign * pack(t, row.arms[k].cross(t))));
+                [side(0, 1.0), side(1, -1.0)]
+            });
+            let of_slip = bodies.scale(along.iter().map(|sides| bodies.weight(sides)).sum::<f64>() / 2.0);
+            slip.tangents.iter_mut().zip(along).for_each(|(to, side)| set(to, side[reference], of_slip));
+            let way = tangents(friction.normal).map(|t| of_slip * t.dot(friction.way));
+            slip.way.iter_mut().zip(way).for_each(|(to, way)| to.0[lane] = way);
+            slip.coefficient.0[lane] = friction.coefficient * scale / of_slip;
+            slip.scale.0[lane] = of_slip;
+        }
+    }
+
+    /// For each bound: whether a row has it.
+    #[inline(always)]
+    pub fn has(&self, bound: usize, lane: usize) -> bool {
+        self.bounds[bound].0[lane].is_finite()
+    }
+
+    /// Number of bounds of the force of a row.
+    pub fn count_bounds(&self, lane: usize) -> usize {
+        usize::from(self.has(0, lane)) + usize::from(self.has(1, lane))
+    }
+
+    /// The gaps at the end of the step at this relative velocity.
+    #[inline(always)]
+    pub fn at(&self, relative: &[f64; 6]) -> Lanes {
+        self.gap + dot(&self.normal, relative)
+    }
+
+    /// How far the gaps are from ones that need no force.
+    pub fn violation(&self, relative: &[f64; 6]) -> f64 {
+        let gap = self.at(relative);
+        let of_row = |lane: usize| match (self.bounds[0].0[lane], self.bounds[1].0[lane]) {
+            (0.0, _) => (-gap.0[lane]).max(0.0),
+            (_, 0.0) => gap.0[lane].max(0.0),
+            _ => gap.0[lane].abs(),
+        };
+        (0..self.count).map(of_row).fold(0.0, f64::max)
+    }
+
+    /// Adds the momentum that pushes and friction give in the step.
+    #[inline(always)]
+    pub fn act(&self, push: Lanes, friction: [Lanes; 2], to: &mut [Lanes; 6]) {
+        to.iter_mut().zip(&self.normal).for_each(|(to, j)| *to += *j * push);
+        if let Some(slip) = &self.slip {
+            for (tangent, friction) in slip.tangents.iter().zip(friction) {
+                to.iter_mut().zip(tangent).for_each(|(to, j)| *to += *j * friction);
+            }
+        }
+    }
+
+    /// The force of a row, N or N m.
+    pub fn to_force(&self, lane: usize, row: &Row, forces: &Forces) -> RowForce {
+        let friction = match (&self.slip, &row.friction) {
+            (Some(slip), Some(friction)) => {
+                let [x, y] = tangents(friction.normal);
+                let [along_x, along_y] = forces.friction.map(|friction| friction.0[lane]);
+                slip.scale.0[lane] * (along_x * x + along_y * y)
+            }
+            _ => DVec3::ZERO,
+        };
+        RowForce { along: forces.push.0[lane] * self.scale.0[lane], friction }
+    }
+}
+
+/// `J v`
+#[inline(always)]
+pub fn dot(j: &[Lanes; 6], v: &[f64; 6]) -> Lanes {
+    (j[0] * v[0] + j[1] * v[1] + j[2] * v[2]) + (j[3] * v[3] + j[4] * v[4] + j[5] * v[5])
+}
+
+impl Slips {
+    /// What a relative velocity adds to the ways.
+    #[inline(always)]
+    pub fn change(&self, relative: &[f64; 6]) -> [Lanes; 2] {
+        [dot(&self.tangents[0], relative), dot(&self.tangents[1], relative)]
     }
 }

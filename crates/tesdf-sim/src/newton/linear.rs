@@ -7,6 +7,8 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Cholesky, LU, Matrix6, U6, Vector6};
 
+use super::relative::{Other, Relative};
+
 /// Which off-diagonal blocks may be nonzero, and the order in which bodies are eliminated.
 #[derive(Clone, Debug)]
 pub struct Pattern {
@@ -88,9 +90,6 @@ impl Pattern {
     }
 }
 
-/// The derivatives of up to `N` quantities by the velocity of a body, for each of two bodies.
-pub type Sides<const N: usize> = [Option<(usize, [Vector6<f64>; N])>; 2];
-
 /// A block matrix. Of a symmetric one it stores one of each pair of mirrored blocks.
 #[derive(Clone, Debug)]
 pub struct BlockMatrix<'a> {
@@ -132,25 +131,17 @@ impl<'a> BlockMatrix<'a> {
         }
     }
 
-    /// Adds `Jᵀ B J`, where `J` is zero except at the bodies of `sides`. `pair` is the index of
-    /// these two bodies in the pattern.
-    #[inline]
-    pub fn add<const N: usize>(&mut self, sides: &Sides<N>, pair: Option<usize>, b: &[[f64; N]; N]) {
-        let [first, second] = sides;
-        let products = [first, second].map(|side| match side {
-            Some((body, j)) => {
-                let product = product(b, j);
-                add_products(&mut self.diagonal[*body], j, &product);
-                product
-            }
-            None => [Vector6::zeros(); N],
-        });
-        if let (Some((a, ja)), Some((b, jb)), Some(pair)) = (first, second, pair) {
-            let ([pa, pb], is_low) = (&products, a < b);
-            let (low, high) = if is_low { ((ja, pa), (jb, pb)) } else { ((jb, pb), (ja, pa)) };
-            add_products(&mut self.upper[pair], low.0, high.1);
+    /// Adds a matrix of a relative velocity.
+    pub fn add(&mut self, of: &Relative, matrix: &Matrix6<f64>) {
+        self.diagonal[of.body] += matrix;
+        if let Some(Other { body, pair }) = of.other {
+            let beside = of.times_transport(matrix);
+            let below = of.transported(matrix);
+            self.diagonal[body] += of.transported(&beside);
+            let [low, high] = if of.body < body { [beside, below] } else { [below, beside] };
+            self.upper[pair] -= low;
             if let Some(lower) = &mut self.lower {
-                add_products(&mut lower[pair], high.0, low.1);
+                lower[pair] -= high;
             }
         }
     }
@@ -165,41 +156,6 @@ impl<'a> BlockMatrix<'a> {
         };
         Some(Factor { pattern, blocks })
     }
-}
-
-/// `B J`
-#[inline]
-fn product<const N: usize>(b: &[[f64; N]; N], j: &[Vector6<f64>; N]) -> [Vector6<f64>; N] {
-    let mut product = [Vector6::zeros(); N];
-    for (to, b) in product.iter_mut().zip(b) {
-        for (b, j) in b.iter().zip(j) {
-            let (to, j) = (&mut to.data.0[0], &j.data.0[0]);
-            for (to, j) in to.iter_mut().zip(j) {
-                *to += b * j;
-            }
-        }
-    }
-    product
-}
-
-/// Adds `Σ jᵣ pᵣᵀ`. With plain loops, because nalgebra's `ger` takes three times as long.
-#[inline]
-fn add_products<const N: usize>(to: &mut Matrix6<f64>, j: &[Vector6<f64>; N], p: &[Vector6<f64>; N]) {
-    for (c, column) in to.data.0.iter_mut().enumerate() {
-        for (j, p) in j.iter().zip(p) {
-            let p = p.data.0[0][c];
-            for (to, j) in column.iter_mut().zip(&j.data.0[0]) {
-                *to += j * p;
-            }
-        }
-    }
-}
-
-/// The scalar product.
-#[inline]
-pub fn dot(a: &Vector6<f64>, b: &Vector6<f64>) -> f64 {
-    let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (a.data.0[0], b.data.0[0]);
-    (a * u + b * v + c * w) + (d * x + e * y + f * z)
 }
 
 fn cholesky(pattern: &Pattern, mut diagonal: Vec<Matrix6<f64>>, upper: &[Matrix6<f64>]) -> Option<Blocks> {
@@ -312,6 +268,7 @@ impl Factor<'_> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
@@ -335,18 +292,23 @@ mod tests {
         Vector6::from_fn(|_, _| random.f64() - 0.5)
     }
 
-    /// Adds random rows between the pairs of a pattern, and friction that follows their push where
-    /// the matrix is general.
+    fn offset(random: &mut fastrand::Rng) -> DVec3 {
+        DVec3::from_array([(); 3].map(|()| random.f64() - 0.5))
+    }
+
+    /// Adds random matrices of relative velocities to the pairs of a pattern, which are symmetric
+    /// where the matrix is.
     fn fill(mut matrix: BlockMatrix<'_>, seed: u64) -> BlockMatrix<'_> {
         let random = &mut fastrand::Rng::with_seed(seed);
-        let follows = if matrix.lower.is_some() { -1.5 } else { 0.0 };
-        let b = [[3.0, 0.0, 0.0], [follows, 2.0, -0.3], [0.2 * follows, -0.3, 1.0]];
-        for (k, &(low, high)) in matrix.pattern.pairs.clone().iter().enumerate() {
-            for _ in 0..20 {
-                let mut side = |body| Some((body, [(); 3].map(|()| vector(random))));
-                matrix.add(&[side(high), side(low)], Some(k), &b);
+        let turned = if matrix.lower.is_some() { 0.3 } else { 0.0 };
+        let pattern = matrix.pattern;
+        for &(low, high) in &pattern.pairs {
+            for (body, other) in [(low, Some(high)), (high, Some(low)), (low, None)] {
+                let root = Matrix6::from_fn(|_, _| random.f64() - 0.5);
+                let skew = Matrix6::from_fn(|_, _| random.f64() - 0.5);
+                let of = Relative::new(body, other, offset(random), pattern);
+                matrix.add(&of, &(root * root.transpose() + turned * (skew - skew.transpose())));
             }
-            matrix.add(&[Some((low, [vector(random)])), None], None, &[[5.0]]);
         }
         matrix
     }
@@ -388,34 +350,36 @@ mod tests {
     fn an_indefinite_matrix_has_no_factor() {
         let pattern = Pattern::new(2, vec![(0, 1)]);
         let mut matrix = BlockMatrix::symmetric(&pattern, vec![Matrix6::identity(); 2]);
-        let side = |body, x| Some((body, [Vector6::repeat(x)]));
-        matrix.add(&[side(0, 1.0), side(1, 1.0)], Some(0), &[[-1.0]]);
+        matrix.add(&Relative::new(0, Some(1), DVec3::ZERO, &pattern), &-Matrix6::repeat(1.0));
         assert!(matrix.factor().is_none());
         assert!(BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 2]).factor().is_none());
     }
 
-    /// The blocks of `Jᵀ B J`, with bodies in either order and alone.
+    /// The matrix of a relative velocity is that of its derivatives by the velocities, and what
+    /// acts on it is their transpose. With bodies in either order and alone.
     #[test]
-    fn blocks_are_the_products_of_the_sides() {
+    fn relative_velocities_have_their_derivatives() {
         let pattern = Pattern::new(2, vec![(0, 1)]);
         let random = &mut fastrand::Rng::with_seed(7);
-        let b = [[3.0, 0.5, 0.2], [-1.0, 2.0, -0.3], [0.4, -0.3, 1.0]];
-        let mut side = |body| Some((body, [(); 3].map(|()| vector(random))));
-        for sides in [[side(0), side(1)], [side(1), side(0)], [None, side(1)]] {
-            let mut matrix = BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 2]);
-            matrix.add(&sides, Some(0), &b);
-            let mut expected = DMatrix::zeros(12, 12);
-            for (p, jp) in sides.iter().flatten() {
-                for (q, jq) in sides.iter().flatten() {
-                    for (r, jp) in jp.iter().enumerate() {
-                        for (c, jq) in jq.iter().enumerate() {
-                            let mut view = expected.fixed_view_mut::<6, 6>(6 * p, 6 * q);
-                            view += jp * jq.transpose() * b[r][c];
-                        }
-                    }
-                }
+        for (body, other) in [(0, Some(1)), (1, Some(0)), (1, None)] {
+            let of = Relative::new(body, other, offset(random), &pattern);
+            let mut derivatives = DMatrix::zeros(6, 12);
+            for k in 0..12 {
+                let mut velocity = [Vector6::zeros(); 2];
+                velocity[k / 6][k % 6] = 1.0;
+                derivatives.column_mut(k).copy_from_slice(&of.of(&velocity));
             }
-            assert!((dense(&matrix) - &expected).amax() < 1e-14, "{sides:?}");
+            let matrix = Matrix6::from_fn(|_, _| random.f64() - 0.5);
+            let mut sum = BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 2]);
+            sum.add(&of, &matrix);
+            let expected = derivatives.transpose() * matrix * &derivatives;
+            assert!((dense(&sum) - &expected).amax() < 1e-14, "{of:?}");
+            let momentum = vector(random);
+            let mut to = [Vector6::zeros(); 2];
+            of.act(momentum.into(), &mut to);
+            let expected = derivatives.transpose() * momentum;
+            let off = (0..12).map(|k| (to[k / 6][k % 6] - expected[k]).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-15, "{of:?}");
         }
     }
 }

@@ -2,17 +2,16 @@
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
-use super::interior::Interior;
-use super::line::{Bodies, Force, Line};
+use super::interior::{Interior, Solution};
+use super::line::{Bodies, Lines, Placed};
 use super::linear::Pattern;
-use super::rows::{Resistance, Row, RowForce};
+use super::rows::{Resistance, RowForce};
 
 /// Bodies, the rows between them, and the velocities without rows.
 #[derive(Debug)]
-pub struct Problem {
+pub struct Problem<'a> {
     bodies: Bodies,
-    /// With their gaps.
-    rows: Vec<(Row, f64)>,
+    rows: Vec<Placed<'a>>,
     pattern: Pattern,
 }
 
@@ -45,24 +44,27 @@ const NEARLY_OPEN: f64 = 1e-3;
 /// A body's points are within about this multiple of its radius of gyration.
 const LEVER: f64 = 2.0;
 
-impl Problem {
-    /// `target` has one velocity per body, in the order of `bodies`. Each row comes with its gap,
-    /// and refers to bodies by their index in `bodies`.
+impl<'a> Problem<'a> {
+    /// `target` has one velocity per body.
     pub fn new(
         inertia: Vec<Matrix6<f64>>,
         mut target: Vec<Vector6<f64>>,
-        rows: Vec<(Row, f64)>,
+        rows: Vec<Placed<'a>>,
         time_step: f64,
     ) -> Self {
         // Inertias are positive definite.
         let invert = |m: &Matrix6<f64>| m.cholesky().map_or_else(Matrix6::zeros, |m| m.inverse());
         let inverse: Vec<_> = inertia.iter().map(invert).collect();
-        for (row, _) in rows.iter().filter(|(row, _)| is_given(row)) {
-            for (body, j) in row.sides.iter().flatten() {
-                target[*body] += inverse[*body] * j * (time_step * row.bounds[0]);
+        for placed in rows.iter().filter(|row| is_given(row)) {
+            for (side, body) in placed.row.sides.iter().zip(placed.bodies) {
+                if let (Some((_, j)), Some(body)) = (side, body) {
+                    target[body] += inverse[body] * j * (time_step * placed.row.bounds[0]);
+                }
             }
         }
-        let pattern = Pattern::new(inertia.len(), rows.iter().filter_map(|(row, _)| pair(row)).collect());
+        let mut pairs: Vec<_> = rows.iter().filter_map(pair).collect();
+        pairs.dedup();
+        let pattern = Pattern::new(inertia.len(), pairs);
         let lever = |m: &Matrix6<f64>| LEVER * (m.fixed_view::<3, 3>(3, 3).trace() / m[(0, 0)]).sqrt();
         let levers = inertia.iter().map(lever).collect();
         Self { bodies: Bodies { inertia, inverse, target, levers, time_step }, rows, pattern }
@@ -70,8 +72,8 @@ impl Problem {
 
     /// The problem whose contacts are springs.
     pub fn softened(mut self) -> Self {
-        for (row, _) in self.rows.iter_mut().filter(|(row, _)| row.is_contact()) {
-            row.resistance = Resistance::Spring;
+        for placed in self.rows.iter_mut().filter(|placed| placed.row.is_contact()) {
+            placed.resistance = Resistance::Spring;
         }
         self
     }
@@ -82,75 +84,68 @@ impl Problem {
     /// the others that its solution closes, until there are none.
     pub fn minimise(&self, start: Vec<Vector6<f64>>, guess: Option<&[RowForce]>) -> Minimum {
         let Bodies { target, time_step, .. } = &self.bodies;
-        let gap = |(row, gap): &(Row, f64), v: &[Vector6<f64>]| gap + time_step * row.rate(v);
-        let change = |row: &(Row, f64)| (gap(row, &start) - gap(row, target)).abs();
-        let of_all = NEAR_OF_ALL * self.rows.iter().map(change).fold(0.0, f64::max);
-        let is_near = |row: &(Row, f64)| {
-            !row.0.is_contact() || gap(row, &start) <= f64::max(NEAR * change(row), of_all)
+        let gaps = |v: &[Vector6<f64>]| -> Vec<f64> {
+            self.rows.iter().map(|placed| placed.at(v, *time_step)).collect()
         };
-        let line = |(row, gap): &(Row, f64)| {
-            let pair = pair(row).and_then(|(a, b)| self.pattern.pair(a, b));
-            Line::new(row, *gap, pair, &self.bodies)
+        let (free, at_start) = (gaps(target), gaps(&start));
+        let change = |k: usize| (at_start[k] - free[k]).abs();
+        let of_all = NEAR_OF_ALL * (0..self.rows.len()).map(change).fold(0.0, f64::max);
+        let is_near = |k: usize| {
+            !self.rows[k].row.is_contact() || at_start[k] <= f64::max(NEAR * change(k), of_all)
         };
-        let near = |(k, row): (usize, &(Row, f64))| {
-            let has_force = guess.is_some_and(|guess| guess[k].along != 0.0);
-            (!is_given(&row.0) && (has_force || is_near(row))).then(|| line(row))
+        let has_force = |k: usize| guess.is_some_and(|guess| guess[k].along != 0.0);
+        let may_act = |k: &usize| !is_given(&self.rows[*k]) && (has_force(*k) || is_near(*k));
+        let mut acts: Vec<bool> = (0..self.rows.len()).map(|k| may_act(&k)).collect();
+        let mut added: Vec<usize> = (0..self.rows.len()).filter(|&k| acts[k]).collect();
+        let mut lines = Lines::default();
+        let mut forces = match guess {
+            Some(guess) => guess.to_vec(),
+            None => vec![RowForce::default(); self.rows.len()],
         };
-        // Of the rows that may act.
-        let mut lines: Vec<Option<Line>> = self.rows.iter().enumerate().map(near).collect();
-        let mut forces = vec![Force::default(); self.rows.len()];
-        if let Some(guess) = guess {
-            for (k, line) in lines.iter().enumerate().filter_map(|(k, line)| Some((k, line.as_ref()?))) {
-                forces[k] = line.of_force(&guess[k]);
-            }
-        }
-        let mut guess = guess.map(|_| start.clone());
+        let mut guess = guess.map(|_| start);
         let mut iterations = 0;
         loop {
-            let acting: Vec<usize> = (0..lines.len()).filter(|&k| lines[k].is_some()).collect();
-            let all = lines.iter().flatten().collect();
-            let interior = Interior { bodies: &self.bodies, pattern: &self.pattern, lines: all };
-            let guessed = guess.map(|velocity| (velocity, acting.iter().map(|&k| forces[k]).collect()));
+            lines.add(added.iter().map(|&k| (k, self.rows[k])), &self.bodies, &self.pattern);
+            let interior = Interior { bodies: &self.bodies, pattern: &self.pattern, lines: &lines };
+            let guessed = guess.map(|velocity| (velocity, lines.forces(|k| (self.rows[k].row, forces[k]))));
             let found = interior.solve(guessed);
             iterations += found.iterations;
-            acting.iter().zip(&found.forces).for_each(|(&k, force)| forces[k] = *force);
+            for (bundle, of_bundle) in lines.bundles.iter().zip(&found.forces) {
+                for (lane, &k) in bundle.rows().iter().enumerate() {
+                    forces[k] = bundle.to_force(lane, self.rows[k].row, of_bundle);
+                }
+            }
             let mut closed = 0.0;
-            for (to, row) in
-                lines.iter_mut().zip(&self.rows).filter(|(to, (row, _))| to.is_none() && !is_given(row))
-            {
-                let [now, free] = [&found.velocity, target].map(|v| gap(row, v));
-                if now < f64::max(NEAR * (now - free).abs(), CLOSED) {
-                    *to = Some(line(row));
+            added.clear();
+            for (k, placed) in self.rows.iter().enumerate().filter(|(k, row)| !acts[*k] && !is_given(row)) {
+                let now = placed.at(&found.velocity, *time_step);
+                if now < f64::max(NEAR * (now - free[k]).abs(), CLOSED) {
+                    added.push(k);
                 }
                 closed = f64::max(closed, -now);
             }
             if closed <= CLOSED || !found.velocity.iter().all(|v| v.norm().is_finite()) {
-                let force = |(k, (row, _)): (usize, &(Row, f64))| match &lines[k] {
-                    Some(line) => line.to_force(&forces[k]),
-                    None if is_given(row) => RowForce { along: row.bounds[0], friction: DVec3::ZERO },
-                    None => RowForce::default(),
-                };
-                return Minimum {
-                    velocity: found.velocity,
-                    forces: self.rows.iter().enumerate().map(force).collect(),
-                    iterations,
-                    converged: found.converged,
-                };
+                for (force, placed) in forces.iter_mut().zip(&self.rows).filter(|(_, row)| is_given(row)) {
+                    *force = RowForce { along: placed.row.bounds[0], friction: DVec3::ZERO };
+                }
+                let Solution { velocity, converged, .. } = found;
+                return Minimum { velocity, forces, iterations, converged };
             }
+            added.iter().for_each(|&k| acts[k] = true);
             guess = (closed < NEARLY_OPEN && found.converged).then_some(found.velocity);
         }
     }
 }
 
 /// Whether the force of a row is given.
-fn is_given(row: &Row) -> bool {
-    row.bounds[0] == row.bounds[1]
+fn is_given(placed: &Placed<'_>) -> bool {
+    placed.row.bounds[0] == placed.row.bounds[1]
 }
 
 /// The two bodies of a row, the lower one first.
-fn pair(row: &Row) -> Option<(usize, usize)> {
-    match row.sides {
-        [Some((a, _)), Some((b, _))] => Some((a.min(b), a.max(b))),
+fn pair(placed: &Placed<'_>) -> Option<(usize, usize)> {
+    match placed.bodies {
+        [Some(a), Some(b)] => Some((a.min(b), a.max(b))),
         _ => None,
     }
 }
@@ -163,7 +158,7 @@ mod tests {
     use crate::MassProperties;
     use crate::newton::integrate::{pack, unpack};
     use crate::newton::interior::LAG;
-    use crate::newton::rows::{FreeBody, Friction, PUSHES, RowId};
+    use crate::newton::rows::{FreeBody, Friction, PUSHES, Row, RowId};
 
     const H: f64 = 1e-3;
 
@@ -177,11 +172,14 @@ mod tests {
         (0..5).map(&mut body).collect()
     }
 
-    /// Contacts at random points with random normals, most of them open when nothing moves.
+    /// Contacts at random points with random normals, most of them open when nothing moves. The
+    /// bodies are side by side.
     fn contacts(count: usize, coefficient: f64, random: &mut fastrand::Rng) -> Vec<Row> {
         let mut vector = || DVec3::new(random.f64() - 0.5, random.f64() - 0.5, random.f64() - 0.5);
+        let centres: [DVec3; 5] = [(); 5].map(|()| 0.5 * vector());
         let mut contact = |k: usize| {
-            let (a, b, normal, arms) = (k % 5, (k + 1) % 5, vector().normalize(), [vector(), vector()]);
+            let (a, b, normal, point) = (k % 5, (k + 1) % 5, vector().normalize(), vector());
+            let arms = [a, b].map(|body| point - centres[body]);
             let side = |body, arm: DVec3, n: DVec3| Some((body, pack(n, arm.cross(n))));
             let gap = 0.1 * H * vector().x.abs();
             Row {
@@ -203,9 +201,13 @@ mod tests {
         (0..count).map(&mut contact).collect()
     }
 
-    fn problem(free: &[FreeBody], target: &[Vector6<f64>], rows: &[Row]) -> Problem {
+    fn problem<'a>(free: &[FreeBody], target: &[Vector6<f64>], rows: &'a [Row]) -> Problem<'a> {
         let inertia = free.iter().map(|body| body.inertia).collect();
-        Problem::new(inertia, target.to_vec(), rows.iter().map(|row| (row.clone(), row.gap)).collect(), H)
+        let placed = |row: &'a Row| {
+            let bodies = row.sides.map(|side| side.map(|(body, _)| body));
+            Placed { row, bodies, gap: row.gap, resistance: row.resistance }
+        };
+        Problem::new(inertia, target.to_vec(), rows.iter().map(placed).collect(), H)
     }
 
     fn velocities(random: &mut fastrand::Rng) -> Vec<Vector6<f64>> {

@@ -119,7 +119,8 @@ impl Row {
     /// 140 µm deep.
     pub fn parting(&self) -> Self {
         let push = |(free, j): (usize, Vector6<f64>)| (free, Vector6::new(j[0], j[1], j[2], 0.0, 0.0, 0.0));
-        Self { sides: self.sides.map(|side| side.map(push)), friction: None, ..self.clone() }
+        let arms = [DVec3::ZERO; 2];
+        Self { sides: self.sides.map(|side| side.map(push)), arms, friction: None, ..self.clone() }
     }
 
     /// Rate of change of the gap at `velocity`, m/s or rad/s.
@@ -130,6 +131,7 @@ impl Row {
 
     /// Takes the mean of the directions of this row and of `other`, which has the same bodies.
     pub fn average(&mut self, other: &Self) {
+        self.arms = [0, 1].map(|k| 0.5 * (self.arms[k] + other.arms[k]));
         for (side, other) in self.sides.iter_mut().zip(&other.sides) {
             if let (Some((_, j)), Some((_, k))) = (side, other) {
                 *j = 0.5 * (*j + k);

@@ -1,8 +1,9 @@
 //! An iterate of the interior point method, and the iterations to the solution.
-use nalgebra::Vector6;
+use nalgebra::{Matrix6, Vector6};
 
 use super::{Effort, Interior, Limits, Solution, WIDTHS};
-use crate::newton::line::{Force, Line};
+use crate::newton::lanes::{Lanes, WIDTH};
+use crate::newton::line::{Bundle, Forces, dot};
 use crate::newton::linear::{BlockMatrix, Factor};
 
 /// Lagged limits stay once the root of ν is below this gap, m.
@@ -32,24 +33,24 @@ const LONG: f64 = 0.7;
 /// Gondzio's correction is taken where it lengthens the step by this factor.
 const LENGTHENS: f64 = 1.05;
 
-/// The state of a row.
+/// The state of a bundle.
 #[derive(Clone, Copy, Debug)]
 struct State {
-    force: f64,
+    force: Lanes,
     /// How far the force is within each bound. Beside a bound, the difference would have no digits.
-    room: [f64; 2],
+    room: [Lanes; 2],
     /// What a gap is beyond zero where the force is at the bound.
-    slack: [f64; 2],
-    friction: [f64; 2],
+    slack: [Lanes; 2],
+    friction: [Lanes; 2],
 }
 
-/// What an iteration knows of a row.
+/// What an iteration knows of a bundle.
 #[derive(Clone, Copy, Debug, Default)]
 struct Local {
     /// Gap and force that do not fit.
-    residual: f64,
+    residual: Lanes,
     /// The decrease of the force with the gap.
-    stiffness: f64,
+    stiffness: Lanes,
     slip: Slipping,
 }
 
@@ -57,43 +58,46 @@ struct Local {
 #[derive(Clone, Copy, Debug, Default)]
 struct Slipping {
     /// u
-    slip: [f64; 2],
+    slip: [Lanes; 2],
     /// b
-    limit: f64,
+    limit: Lanes,
     /// a
-    width: f64,
+    width: Lanes,
     /// r
-    length: f64,
+    length: Lanes,
     /// u / r
-    along: [f64; 2],
+    along: [Lanes; 2],
     /// −λ / b, at most 1.
-    share: [f64; 2],
+    share: [Lanes; 2],
     /// The decrease of the friction with the slip: xx, xy, yy.
-    stiffness: [f64; 3],
+    stiffness: [Lanes; 3],
     /// The least a.
-    least: f64,
+    least: Lanes,
+}
+
+/// The changes of push and friction when the velocities stay.
+#[derive(Clone, Copy, Debug, Default)]
+struct Standing {
+    push: Lanes,
+    friction: [Lanes; 2],
+}
+
+/// The change of a bundle.
+#[derive(Clone, Copy, Debug, Default)]
+struct Change {
+    force: Lanes,
+    slack: [Lanes; 2],
+    /// The friction after a whole step, not its change.
+    friction: [Lanes; 2],
 }
 
 /// A change of all unknowns.
+#[derive(Default)]
 struct Direction {
     velocity: Vec<Vector6<f64>>,
-    rows: Vec<RowDirection>,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct RowDirection {
-    force: f64,
-    slack: [f64; 2],
-    /// The friction after a whole step, not its change.
-    friction: [f64; 2],
-}
-
-/// What a direction aims at.
-struct Aim<'a> {
-    /// For each bound of each row: the change of room × slack.
-    products: &'a [[f64; 2]],
-    /// ν of friction.
-    centre: f64,
+    rows: Vec<Change>,
+    /// The greatest step at which all rooms and slacks are positive.
+    longest: f64,
 }
 
 /// Positive slack and room whose difference is `gap` and whose product is `centre`.
@@ -103,57 +107,86 @@ fn on_path(gap: f64, centre: f64) -> [f64; 2] {
     [slack, centre / slack]
 }
 
-impl State {
-    /// The state at the gap `gap` with this ν. A row without bounds keeps the force `kept`.
-    fn new(line: &Line, gap: f64, centre: f64, kept: Force) -> Self {
-        let [low, high] = line.bounds;
-        let (force, room, slack) = match (low.is_finite(), high.is_finite()) {
-            (true, false) => {
-                let [slack, room] = on_path(gap, centre);
-                (low + room, [room, f64::INFINITY], [slack, 0.0])
-            }
-            (false, true) => {
-                let [slack, room] = on_path(-gap, centre);
-                (high - room, [f64::INFINITY, room], [0.0, slack])
-            }
-            (true, true) => {
-                // ν / (half + x) − ν / (half − x) = gap
-                let half = 0.5 * (high - low);
-                let root = centre + (centre * centre + (gap * half).powi(2)).sqrt();
-                let x = -gap * half * half / root;
-                // (half − |x|) (half + |x|) = 2 ν |x| / |gap|
-                let near = 2.0 * centre * half * half / root / (half + x.abs());
-                let room = if x < 0.0 { [near, half - x] } else { [half + x, near] };
-                (0.5 * (low + high) + x, room, room.map(|room| centre / room))
-            }
-            (false, false) => (kept.push, [f64::INFINITY; 2], [0.0; 2]),
-        };
-        Self { force, room, slack, friction: kept.friction }
-    }
-
-    /// Room × slack of each bound.
-    #[inline]
-    fn products(&self, line: &Line) -> [f64; 2] {
-        let of = |k: usize| if line.bounds[k].is_finite() { self.room[k] * self.slack[k] } else { 0.0 };
-        [of(0), of(1)]
-    }
-
-    /// The force that is reported. An open contact has none.
-    fn force(&self, line: &Line) -> Force {
-        let is_at = |k: usize| line.bounds[k].is_finite() && self.room[k] < self.slack[k];
-        match [is_at(0), is_at(1)] {
-            [true, _] => Force { push: line.bounds[0], friction: [0.0; 2] },
-            [_, true] => Force { push: line.bounds[1], friction: [0.0; 2] },
-            _ => Force { push: self.force, friction: self.friction },
+/// Force, room and slack of a row at the gap `gap` with this ν. A row without bounds keeps its
+/// force.
+fn on_path_between([low, high]: [f64; 2], gap: f64, centre: f64, kept: f64) -> (f64, [f64; 2], [f64; 2]) {
+    match (low.is_finite(), high.is_finite()) {
+        (true, false) => {
+            let [slack, room] = on_path(gap, centre);
+            (low + room, [room, f64::INFINITY], [slack, 0.0])
         }
+        (false, true) => {
+            let [slack, room] = on_path(-gap, centre);
+            (high - room, [f64::INFINITY, room], [0.0, slack])
+        }
+        (true, true) => {
+            // ν / (half + x) − ν / (half − x) = gap
+            let half = 0.5 * (high - low);
+            let root = centre + (centre * centre + (gap * half).powi(2)).sqrt();
+            let x = -gap * half * half / root;
+            // (half − |x|) (half + |x|) = 2 ν |x| / |gap|
+            let near = 2.0 * centre * half * half / root / (half + x.abs());
+            let room = if x < 0.0 { [near, half - x] } else { [half + x, near] };
+            (0.5 * (low + high) + x, room, room.map(|room| centre / room))
+        }
+        (false, false) => (kept, [f64::INFINITY; 2], [0.0; 2]),
     }
 }
 
+impl State {
+    fn new(bundle: &Bundle, relative: &[f64; 6], centre: f64, kept: &Forces) -> Self {
+        let gap = bundle.at(relative);
+        let (mut force, mut room, mut slack) = (Lanes::ZERO, [Lanes::ZERO; 2], [Lanes::ZERO; 2]);
+        for lane in 0..WIDTH {
+            let (bounds, push) = (bundle.bounds.map(|bound| bound.0[lane]), kept.push.0[lane]);
+            // Where only one bound is near, so that the force comes out again.
+            let of_force = if bundle.count_bounds(lane) == 2 { 0.0 } else { push };
+            let found = on_path_between(bounds, gap.0[lane] - of_force, centre, push);
+            force.0[lane] = found.0;
+            for k in [0, 1] {
+                (room[k].0[lane], slack[k].0[lane]) = (found.1[k], found.2[k]);
+            }
+        }
+        Self { force, room, slack, friction: kept.friction }
+    }
+
+    /// Room × slack of each bound; zero without a bound.
+    #[inline(always)]
+    fn products(&self) -> [Lanes; 2] {
+        [0, 1].map(|k| bounded(self.room[k], self.room[k] * self.slack[k]))
+    }
+
+    /// The forces that are reported. An open contact has none.
+    fn forces(&self, bundle: &Bundle) -> Forces {
+        let mut forces = Forces { push: self.force, friction: self.friction };
+        for lane in 0..WIDTH {
+            let is_at = |k: usize| bundle.has(k, lane) && self.room[k].0[lane] < self.slack[k].0[lane];
+            if let Some(k) = (0..2).find(|&k| is_at(k)) {
+                forces.push.0[lane] = bundle.bounds[k].0[lane];
+                forces.friction.iter_mut().for_each(|friction| friction.0[lane] = 0.0);
+            }
+        }
+        forces
+    }
+}
+
+/// The values of rows with a bound, zero for others: where the room is infinite.
+#[inline(always)]
+fn bounded(room: Lanes, values: Lanes) -> Lanes {
+    room.zip(values, |room, value| if room < f64::INFINITY { value } else { 0.0 })
+}
+
+/// The step at which values become zero.
+#[inline(always)]
+fn to_zero(value: Lanes, change: Lanes) -> Lanes {
+    value.zip(change, |value, change| if change < 0.0 { -value / change } else { f64::INFINITY })
+}
+
 /// An iterate.
-pub struct Run<'a> {
+pub struct Iterate<'a> {
     of: &'a Interior<'a>,
     velocity: Vec<Vector6<f64>>,
-    rows: Vec<State>,
+    states: Vec<State>,
     /// ν of friction.
     centre: f64,
     /// Number of factorisations so far.
@@ -162,40 +195,57 @@ pub struct Run<'a> {
     bounds: usize,
     /// ν at the end.
     least: f64,
+    /// What the iteration knows of the bundles, ...
+    locals: Vec<Local>,
+    standing: Vec<Standing>,
+    /// ... and what it aims at: for each bound of each row, the change of room × slack.
+    aims: Vec<[Lanes; 2]>,
 }
 
-impl<'a> Run<'a> {
+impl<'a> Iterate<'a> {
     /// From velocities and forces that are nearly right.
-    pub fn from(of: &'a Interior<'a>, velocity: Vec<Vector6<f64>>, forces: &[Force], centre: f64) -> Self {
-        let state = |(line, force): (&&Line, &Force)| {
-            // Where only one bound is near, so that the force comes out again.
-            let kept = if line.count_bounds() == 2 { 0.0 } else { force.push };
-            State::new(line, line.at(&velocity) - kept, centre, *force)
+    pub fn from(of: &'a Interior<'a>, velocity: Vec<Vector6<f64>>, forces: &[Forces], centre: f64) -> Self {
+        let state = |(k, bundle, relative): (usize, &Bundle, [f64; 6])| {
+            State::new(bundle, &relative, centre, &forces[k])
         };
-        let rows = of.lines.iter().zip(forces).map(state).collect();
-        let (bounds, least) = (of.count_bounds(), of.mean_square(LEAST_GAP));
-        Self { of, velocity, rows, centre, iterations: 0, bounds, least }
+        let states: Vec<_> = of.bundles(&velocity).map(state).collect();
+        let (bounds, least, count) = (of.count_bounds(), of.mean_square(LEAST_GAP), states.len());
+        Self {
+            of,
+            velocity,
+            states,
+            centre,
+            iterations: 0,
+            bounds,
+            least,
+            locals: vec![Local::default(); count],
+            standing: vec![Standing::default(); count],
+            aims: vec![[Lanes::ZERO; 2]; count],
+        }
     }
 
     /// From the velocities that the springs of all rows would lead to.
     pub fn cold(of: &'a Interior<'a>) -> Self {
-        let violations = of.lines.iter().map(|line| line.violation(&of.bodies.target));
-        let greatest = violations.fold(0.0, f64::max);
-        let centre = f64::max((FIRST * greatest).powi(2), of.mean_square(LEAST_GAP));
-        let none = vec![Force::default(); of.lines.len()];
+        let centre = f64::max((FIRST * of.greatest_violation()).powi(2), of.mean_square(LEAST_GAP));
+        let none = vec![Forces::default(); of.lines.bundles.len()];
         let mut matrix = BlockMatrix::symmetric(of.pattern, of.bodies.inertia.to_vec());
         let mut momentum: Vec<_> =
             of.bodies.inertia.iter().zip(&of.bodies.target).map(|(m, v)| m * v).collect();
-        for line in &of.lines {
-            let k = if line.count_bounds() > 0 { 1.0 } else { 1.0 / line.compliance };
-            let way = line.slip.as_ref().map_or([0.0; 2], |slip| slip.way);
-            line.act(-k * line.gap, way.map(|way| -way), &mut momentum);
-            match &line.slip {
-                Some(slip) => {
-                    matrix.add(&slip.sides, line.pair, &[[k, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        for batch in &of.lines.batches {
+            let group = &of.lines.groups[batch.group];
+            let (mut sum, mut acting) = (Sum::default(), [Lanes::ZERO; 6]);
+            for bundle in &of.lines.bundles[batch.bundles.clone()] {
+                let mut k = Lanes::splat(1.0);
+                for lane in (0..WIDTH).filter(|&lane| bundle.count_bounds(lane) == 0) {
+                    k.0[lane] = 1.0 / bundle.compliance.0[lane];
                 }
-                None => matrix.add(&line.sides, line.pair, &[[k]]),
+                let way = bundle.slip.as_ref().map_or([Lanes::ZERO; 2], |slip| slip.way.map(|way| -way));
+                bundle.act(-(k * bundle.gap), way, &mut acting);
+                let [zero, one] = [0.0, 1.0].map(Lanes::splat);
+                sum.add(bundle, k, [zero; 2], [one, zero, one]);
             }
+            group.act(acting.map(Lanes::sum), &mut momentum);
+            matrix.add(group, &sum.total(!batch.slips));
         }
         // Joints are stiff, so rounding may make the matrix indefinite.
         let velocity =
@@ -205,210 +255,214 @@ impl<'a> Run<'a> {
 
     /// The mean of room × slack.
     fn product(&self) -> f64 {
-        let products = self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.products(line));
-        let sum = products.fold(0.0, |sum, [a, b]| sum + a + b);
-        sum / self.bounds.max(1) as f64
+        let products = self.states.iter().map(State::products);
+        let sum = products.fold(Lanes::ZERO, |sum, [a, b]| sum + (a + b));
+        sum.sum() / self.bounds.max(1) as f64
     }
 
     /// What the rows do.
-    fn forces(&self) -> Vec<Force> {
-        self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.force(line)).collect()
+    fn forces(&self) -> Vec<Forces> {
+        self.states.iter().zip(&self.of.lines.bundles).map(|(state, bundle)| state.forces(bundle)).collect()
     }
 
-    /// The momentum that velocities and forces leave.
-    fn momentum(&self) -> Vec<Vector6<f64>> {
-        let mut momentum = self.of.lack(&self.velocity);
-        for (line, row) in self.of.lines.iter().zip(&self.rows) {
-            line.act(row.force, row.friction, &mut momentum);
-        }
-        momentum
-    }
-
-    fn local(&self, k: usize, limits: &Limits, width: f64) -> Local {
-        let (line, row) = (self.of.lines[k], &self.rows[k]);
-        let gap = line.at(&self.velocity);
-        // Where a bound is infinite, the slack is zero.
-        let softness = line.compliance + row.slack[0] / row.room[0] + row.slack[1] / row.room[1];
-        let residual = gap + line.compliance * row.force - row.slack[0] + row.slack[1];
-        let slip = line.slip.as_ref().map_or(Slipping::default(), |slip| {
-            let [x, y] = slip.change(&self.velocity);
-            let u = [slip.way[0] + x, slip.way[1] + y];
-            let limit = limits.of(k, slip, row.force);
-            // A spring sticks as softly as it pushes.
-            let least = (width * slip.scale).max(0.5 * limit * line.compliance);
-            let path = self.centre / limit;
-            let width = path.max(least);
-            let length = (width * width + u[0] * u[0] + u[1] * u[1]).sqrt();
-            let along = u.map(|u| u / length);
-            let size = row.friction[0].hypot(row.friction[1]).max(limit);
-            let share = row.friction.map(|friction| -friction / size);
-            let k = limit / (width + length);
-            let stiffness = [
-                k * (1.0 - share[0] * along[0]),
-                -0.5 * k * (share[0] * along[1] + share[1] * along[0]),
-                k * (1.0 - share[1] * along[1]),
-            ];
-            Slipping { slip: u, limit, width, least, length, along, share, stiffness }
-        });
-        Local { residual, stiffness: 1.0 / softness, slip }
-    }
-
-    fn matrix(&self, locals: &[Local], is_coulomb: bool) -> BlockMatrix<'a> {
+    /// Finds what an iteration has to know. Returns the matrix, the momentum that velocities and
+    /// forces leave, and that which the predictor has to bring.
+    fn linearise(
+        &mut self,
+        limits: &Limits,
+        width: f64,
+        is_coulomb: bool,
+    ) -> (BlockMatrix<'a>, [Vec<Vector6<f64>>; 2]) {
+        let lines = self.of.lines;
         let inertia = self.of.bodies.inertia.to_vec();
         let mut matrix = match is_coulomb {
             true => BlockMatrix::general(self.of.pattern, inertia),
             false => BlockMatrix::symmetric(self.of.pattern, inertia),
         };
-        for (line, Local { stiffness: d, slip: at, .. }) in self.of.lines.iter().zip(locals) {
-            match &line.slip {
-                Some(slip) => {
-                    let [xx, xy, yy] = at.stiffness;
-                    let follows = if is_coulomb { -slip.coefficient * d } else { 0.0 };
-                    let b =
-                        [[*d, 0.0, 0.0], [follows * at.along[0], xx, xy], [follows * at.along[1], xy, yy]];
-                    matrix.add(&slip.sides, line.pair, &b);
+        let mut momentum = self.of.lack(&self.velocity);
+        let mut brought = vec![Vector6::zeros(); momentum.len()];
+        for batch in &lines.batches {
+            let group = &lines.groups[batch.group];
+            let relative = group.of(&self.velocity);
+            let (mut sum, mut acting, mut change) =
+                (Sum::default(), [Lanes::ZERO; 6], [Lanes::ZERO; 6]);
+            for k in batch.bundles.clone() {
+                let (bundle, state) = (&lines.bundles[k], &mut self.states[k]);
+                let local = Local::new(bundle, state, &relative, limits, k, self.centre, width);
+                if bundle.slip.is_some() {
+                    state.friction = local.slip.share.map(|share| -(local.slip.limit * share));
                 }
-                None => matrix.add(&line.sides, line.pair, &[[*d]]),
+                bundle.act(state.force, state.friction, &mut acting);
+                let away = state.products().map(|product| -product);
+                let standing = local.standing(bundle, state, &away, self.least, is_coulomb);
+                bundle.act(standing.push, standing.added(state), &mut change);
+                let follows = match (&bundle.slip, is_coulomb) {
+                    (Some(slip), true) => {
+                        let follows = -(slip.coefficient * local.stiffness);
+                        local.slip.along.map(|along| follows * along)
+                    }
+                    _ => [Lanes::ZERO; 2],
+                };
+                sum.add(bundle, local.stiffness, follows, local.slip.stiffness);
+                (self.locals[k], self.standing[k], self.aims[k]) = (local, standing, away);
+            }
+            group.act(acting.map(Lanes::sum), &mut momentum);
+            group.act(change.map(Lanes::sum), &mut brought);
+            matrix.add(group, &sum.total(!batch.slips));
+        }
+        brought.iter_mut().zip(&momentum).for_each(|(to, momentum)| *to += momentum);
+        (matrix, [momentum, brought])
+    }
+
+    /// The change of all unknowns to the aims, for the present `momentum`, where ν of friction is
+    /// to become `centre`.
+    fn direction(
+        &mut self,
+        factor: &Factor<'_>,
+        momentum: &[Vector6<f64>],
+        centre: f64,
+        is_coulomb: bool,
+        to: &mut Direction,
+    ) {
+        let lines = self.of.lines;
+        let mut brought = momentum.to_vec();
+        for batch in &lines.batches {
+            let mut change = [Lanes::ZERO; 6];
+            for k in batch.bundles.clone() {
+                let (bundle, state) = (&lines.bundles[k], &self.states[k]);
+                let standing = self.locals[k].standing(bundle, state, &self.aims[k], centre, is_coulomb);
+                bundle.act(standing.push, standing.added(state), &mut change);
+                self.standing[k] = standing;
+            }
+            lines.groups[batch.group].act(change.map(Lanes::sum), &mut brought);
+        }
+        self.follow(factor, &brought, is_coulomb, to);
+    }
+
+    /// The change of all unknowns with the momentum `brought`.
+    fn follow(
+        &self,
+        factor: &Factor<'_>,
+        brought: &[Vector6<f64>],
+        is_coulomb: bool,
+        to: &mut Direction,
+    ) {
+        let lines = self.of.lines;
+        to.velocity = factor.solve(brought);
+        to.rows.resize(lines.bundles.len(), Change::default());
+        let mut longest = Lanes::splat(f64::INFINITY);
+        for batch in &lines.batches {
+            let relative = lines.groups[batch.group].of(&to.velocity);
+            for k in batch.bundles.clone() {
+                let (bundle, local, state) = (&lines.bundles[k], &self.locals[k], &self.states[k]);
+                let (standing, products) = (&self.standing[k], &self.aims[k]);
+                let yields = local.stiffness * dot(&bundle.normal, &relative);
+                let force = standing.push - yields;
+                let slack = [
+                    (products[0] - state.slack[0] * force) / state.room[0],
+                    (products[1] + state.slack[1] * force) / state.room[1],
+                ];
+                let mut friction = [Lanes::ZERO; 2];
+                if let Some(slip) = &bundle.slip {
+                    let ([x, y], [xx, xy, yy]) = (slip.change(&relative), local.slip.stiffness);
+                    let [u, v] = local.slip.along;
+                    friction = standing.friction;
+                    friction[0] -= xx * x + xy * y;
+                    friction[1] -= xy * x + yy * y;
+                    if is_coulomb {
+                        let follows = slip.coefficient * yields;
+                        friction[0] += follows * u;
+                        friction[1] += follows * v;
+                    }
+                }
+                for (value, change) in [
+                    (state.room[0], force),
+                    (state.room[1], -force),
+                    (state.slack[0], slack[0]),
+                    (state.slack[1], slack[1]),
+                ] {
+                    longest = longest.zip(to_zero(value, change), |a, b| if b < a { b } else { a });
+                }
+                to.rows[k] = Change { force, slack, friction };
             }
         }
-        matrix
+        to.longest = longest.least();
     }
 
-    /// The change of all unknowns to an aim, for the present `momentum`.
-    fn direction(
-        &self,
-        factor: &Factor<'_>,
-        momentum: &[Vector6<f64>],
-        locals: &[Local],
-        aim: &Aim<'_>,
-        is_coulomb: bool,
-    ) -> Direction {
-        let mut momentum = momentum.to_vec();
-        // The changes of push and friction when the velocities stay.
-        let mut standing = Vec::with_capacity(self.rows.len());
-        for (k, (line, row)) in self.of.lines.iter().zip(&self.rows).enumerate() {
-            let (local, products) = (&locals[k], aim.products[k]);
-            let push =
-                local.stiffness * (products[0] / row.room[0] - products[1] / row.room[1] - local.residual);
-            let friction = line.slip.as_ref().map_or([0.0; 2], |slip| {
-                let at = &local.slip;
-                let wider = (aim.centre / at.limit).max(at.least) - at.width;
-                let follows = if is_coulomb { slip.coefficient * push } else { 0.0 };
-                let [k, wider] = [at.limit / (at.width + at.length), at.limit * wider / at.length];
-                [0, 1].map(|i| wider * at.share[i] - k * at.slip[i] - follows * at.along[i])
-            });
-            line.act(push, [friction[0] - row.friction[0], friction[1] - row.friction[1]], &mut momentum);
-            standing.push((push, friction));
-        }
-        let velocity = factor.solve(&momentum);
-        let of_row = |k: usize| {
-            let (line, local, row, (push, friction)) =
-                (self.of.lines[k], &locals[k], &self.rows[k], standing[k]);
-            let yields = local.stiffness * line.change(&velocity);
-            let force = push - yields;
-            let products = aim.products[k];
-            let slack = [
-                (products[0] - row.slack[0] * force) / row.room[0],
-                (products[1] + row.slack[1] * force) / row.room[1],
-            ];
-            let friction = line.slip.as_ref().map_or([0.0; 2], |slip| {
-                let ([x, y], [xx, xy, yy]) = (slip.change(&velocity), local.slip.stiffness);
-                let follows = if is_coulomb { slip.coefficient * yields } else { 0.0 };
-                let [u, v] = local.slip.along;
-                [friction[0] - xx * x - xy * y + follows * u, friction[1] - xy * x - yy * y + follows * v]
-            });
-            RowDirection { force, slack, friction }
-        };
-        Direction { rows: (0..self.rows.len()).map(of_row).collect(), velocity }
-    }
-
-    /// The greatest step at which all rooms and slacks are positive.
-    fn longest(&self, direction: &Direction) -> f64 {
-        let to_zero = |value: f64, change: f64| if change < 0.0 { -value / change } else { f64::INFINITY };
-        let of_row = |((row, change), line): ((&State, &RowDirection), &&Line)| {
-            let of_bound = |k: usize, force: f64| match line.bounds[k].is_finite() {
-                true => to_zero(row.slack[k], change.slack[k]).min(to_zero(row.room[k], force)),
-                false => f64::INFINITY,
-            };
-            of_bound(0, change.force).min(of_bound(1, -change.force))
-        };
-        self.rows.iter().zip(&direction.rows).zip(&self.of.lines).map(of_row).fold(f64::INFINITY, f64::min)
-    }
-
-    /// The direction of an iteration, how far to go along it, and ν of friction at its end.
+    /// The direction of an iteration, how far to go along it, and ν of friction at its end. The
+    /// three `directions` are memory.
     fn next(
-        &self,
+        &mut self,
         factor: &Factor<'_>,
         momentum: &[Vector6<f64>],
-        locals: &[Local],
+        brought: &[Vector6<f64>],
         is_coulomb: bool,
-    ) -> (Direction, f64, f64) {
-        let direction = |products: &[[f64; 2]], centre: f64| {
-            self.direction(factor, momentum, locals, &Aim { products, centre }, is_coulomb)
-        };
-        let products: Vec<[f64; 2]> =
-            self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.products(line)).collect();
-        let away: Vec<[f64; 2]> = products.iter().map(|now| now.map(|product| -product)).collect();
-        let predictor = direction(&away, self.least);
+        [predictor, corrected, again]: &mut [Direction; 3],
+    ) -> (f64, f64) {
+        self.follow(factor, brought, is_coulomb, predictor);
         if self.bounds == 0 {
-            return (predictor, 1.0, self.centre);
+            std::mem::swap(predictor, corrected);
+            return (1.0, self.centre);
         }
-        let affine = self.longest(&predictor).min(1.0);
+        let affine = predictor.longest.min(1.0);
         let product = self.product();
         let centring = (1.0 - affine).powi(3).max(LEAST_CENTRING);
         let centre = (centring * product).max(self.least).min(product.max(self.least));
-        let mut aims: Vec<[f64; 2]> = Vec::with_capacity(products.len());
-        for ((now, change), line) in products.iter().zip(&predictor.rows).zip(&self.of.lines) {
-            let aim = |k: usize, sign: f64| match line.bounds[k].is_finite() {
-                true => centre - now[k] - sign * change.slack[k] * change.force,
-                false => 0.0,
-            };
-            aims.push([aim(0, 1.0), aim(1, -1.0)]);
+        for ((aims, change), state) in self.aims.iter_mut().zip(&predictor.rows).zip(&self.states) {
+            // They were the products, away from zero.
+            let centre = Lanes::splat(centre);
+            aims[0] = bounded(state.room[0], centre + aims[0] - change.slack[0] * change.force);
+            aims[1] = bounded(state.room[1], centre + aims[1] + change.slack[1] * change.force);
         }
-        let mut corrected = direction(&aims, centre);
-        let mut longest = self.longest(&corrected);
-        if longest < 1.0 / LENGTHENS {
-            let farther = (1.5 * longest + 0.1).min(1.0);
-            for (((aims, row), change), line) in
-                aims.iter_mut().zip(&self.rows).zip(&corrected.rows).zip(&self.of.lines)
-            {
-                for (k, sign) in
-                    [(0, 1.0), (1, -1.0)].into_iter().filter(|&(k, _)| line.bounds[k].is_finite())
-                {
-                    let room = row.room[k] + farther * sign * change.force;
-                    let product = room * (row.slack[k] + farther * change.slack[k]);
-                    aims[k] += (product.clamp(0.1 * centre, 10.0 * centre) - product).max(-10.0 * centre);
+        self.direction(factor, momentum, centre, is_coulomb, corrected);
+        if corrected.longest < 1.0 / LENGTHENS {
+            let farther = (1.5 * corrected.longest + 0.1).min(1.0);
+            for ((aims, state), change) in self.aims.iter_mut().zip(&self.states).zip(&corrected.rows) {
+                for (k, force) in [(0, change.force), (1, -change.force)] {
+                    let room = state.room[k] + force * farther;
+                    let product = room * (state.slack[k] + change.slack[k] * farther);
+                    let missing = product.map(|product| {
+                        (product.clamp(0.1 * centre, 10.0 * centre) - product).max(-10.0 * centre)
+                    });
+                    aims[k] += bounded(state.room[k], missing);
                 }
             }
-            let again = direction(&aims, centre);
-            let reach = self.longest(&again);
-            if reach.min(1.0) >= LENGTHENS * longest {
-                (corrected, longest) = (again, reach);
+            self.direction(factor, momentum, centre, is_coulomb, again);
+            if again.longest.min(1.0) >= LENGTHENS * corrected.longest {
+                std::mem::swap(corrected, again);
             }
         }
         let shorter = SHORTER * (100.0 * (1.0 - affine)).clamp(1e-4, 1.0);
-        (corrected, ((1.0 - shorter) * longest).min(1.0), centre)
+        (((1.0 - shorter) * corrected.longest).min(1.0), centre)
     }
 
     /// Goes along a direction.
     fn advance(&mut self, direction: &Direction, step: f64, limits: &Limits) {
         self.velocity.iter_mut().zip(&direction.velocity).for_each(|(v, change)| *v += step * change);
-        for (k, ((row, change), line)) in
-            self.rows.iter_mut().zip(&direction.rows).zip(&self.of.lines).enumerate()
+        for (k, ((state, change), bundle)) in
+            self.states.iter_mut().zip(&direction.rows).zip(&self.of.lines.bundles).enumerate()
         {
-            row.force += step * change.force;
-            row.room[0] += step * change.force;
-            row.room[1] -= step * change.force;
-            row.slack[0] += step * change.slack[0];
-            row.slack[1] += step * change.slack[1];
-            let Some(slip) = &line.slip else { continue };
-            let limit = limits.of(k, slip, row.force);
-            row.friction = [0, 1].map(|k| row.friction[k] + step * (change.friction[k] - row.friction[k]));
-            let size = row.friction[0].hypot(row.friction[1]);
-            if size > limit {
-                row.friction = row.friction.map(|friction| friction * limit / size);
-            }
+            let force = change.force * step;
+            state.force += force;
+            state.room[0] += force;
+            state.room[1] -= force;
+            state.slack[0] += change.slack[0] * step;
+            state.slack[1] += change.slack[1] * step;
+            let Some(slip) = &bundle.slip else { continue };
+            let limit = limits.of(k, slip, state.force);
+            let [x, y] = [0, 1].map(|k| state.friction[k] + (change.friction[k] - state.friction[k]) * step);
+            let size = (x * x + y * y).sqrt();
+            let share = limit.zip(size, |limit, size| if size > limit { limit / size } else { 1.0 });
+            state.friction = [x * share, y * share];
         }
+    }
+
+    /// The greatest gap and force that do not fit, m.
+    fn open(&self) -> f64 {
+        let of_bundle =
+            |(local, bundle): (&Local, &Bundle)| local.residual.map(f64::abs) / bundle.scale;
+        let greatest = self.locals.iter().zip(&self.of.lines.bundles).map(of_bundle);
+        greatest.fold(Lanes::ZERO, Lanes::max).0.into_iter().fold(0.0, f64::max)
     }
 
     /// Iterates to the end.
@@ -417,6 +471,7 @@ impl<'a> Run<'a> {
         let [freeze, few] = [self.of.mean_square(FREEZE), FEW * self.least];
         let balanced = BALANCED[0] + BALANCED[1] * self.of.way(&self.of.bodies.target);
         let (mut width, mut short_steps, mut left) = (effort.width, 0, effort.iterations);
+        let mut directions = [(); 3].map(|()| Direction::default());
         // The solution with the first width.
         let mut coarse = None;
         while left > 0 && short_steps < effort.short_steps {
@@ -425,26 +480,19 @@ impl<'a> Run<'a> {
                 limits = Limits::Fixed(self.of.limits(&self.forces()));
             }
             let is_coulomb = has_friction && matches!(limits, Limits::Coulomb);
-            let locals: Vec<Local> =
-                (0..self.rows.len()).map(|k| self.local(k, &limits, WIDTHS[width])).collect();
-            for (row, local) in self.rows.iter_mut().zip(&locals) {
-                row.friction = local.slip.share.map(|share| -local.slip.limit * share);
-            }
-            let momentum = self.momentum();
-            let Some(factor) = self.matrix(&locals, is_coulomb).factor() else { break };
+            let (matrix, [momentum, brought]) = self.linearise(&limits, WIDTHS[width], is_coulomb);
+            let Some(factor) = matrix.factor() else { break };
             self.iterations += 1;
-            let (direction, step, centre) = self.next(&factor, &momentum, &locals, is_coulomb);
-            self.advance(&direction, step, &limits);
+            let (step, centre) = self.next(&factor, &momentum, &brought, is_coulomb, &mut directions);
+            let direction = &directions[1];
+            self.advance(direction, step, &limits);
             self.centre = (self.centre + step * (centre - self.centre)).max(self.least);
             let way = self.of.way(&direction.velocity);
             if !way.is_finite() {
                 break;
             }
             short_steps = if step < SHORT { short_steps + 1 } else { 0 };
-            let open = || {
-                let gaps = locals.iter().zip(&self.of.lines).map(|(l, line)| l.residual.abs() / line.scale);
-                gaps.fold(0.0, f64::max) * (1.0 - step)
-            };
+            let open = || self.open() * (1.0 - step);
             let is_balanced = || !is_coulomb || self.of.way_of_momentum(&momentum) < balanced;
             if step > LONG && way < SETTLED && open() < SETTLED && is_balanced() && self.product() <= few {
                 if !has_friction || width + 1 == WIDTHS.len() {
@@ -464,5 +512,124 @@ impl<'a> Run<'a> {
         let limits = if let Limits::Fixed(limits) = limits { limits.clone() } else { Vec::new() };
         let (velocity, forces) = (self.velocity.clone(), self.forces());
         Solution { velocity, forces, iterations: self.iterations, converged, limits }
+    }
+}
+
+impl Local {
+    /// Of bundle `k`.
+    #[inline(always)]
+    fn new(
+        bundle: &Bundle,
+        state: &State,
+        relative: &[f64; 6],
+        limits: &Limits,
+        k: usize,
+        centre: f64,
+        width: f64,
+    ) -> Self {
+        // Where a bound is infinite, the slack is zero and the room infinite.
+        let [low, high] = [0, 1].map(|k| state.slack[k] / state.room[k]);
+        let softness = bundle.compliance + low + high;
+        let residual =
+            bundle.at(relative) + bundle.compliance * state.force - state.slack[0] + state.slack[1];
+        let slip = bundle.slip.as_ref().map_or(Slipping::default(), |slip| {
+            let [x, y] = slip.change(relative);
+            let u = [slip.way[0] + x, slip.way[1] + y];
+            let limit = limits.of(k, slip, state.force);
+            // A spring sticks as softly as it pushes.
+            let least = (slip.scale * width).max(limit * bundle.compliance * 0.5);
+            let width = (Lanes::splat(centre) / limit).max(least);
+            let length = (width * width + u[0] * u[0] + u[1] * u[1]).sqrt();
+            let along = u.map(|u| u / length);
+            let [x, y] = state.friction;
+            let size = (x * x + y * y).sqrt().max(limit);
+            let share = state.friction.map(|friction| -(friction / size));
+            let k = limit / (width + length);
+            let one = Lanes::splat(1.0);
+            let stiffness = [
+                k * (one - share[0] * along[0]),
+                k * (share[0] * along[1] + share[1] * along[0]) * -0.5,
+                k * (one - share[1] * along[1]),
+            ];
+            Slipping { slip: u, limit, width, least, length, along, share, stiffness }
+        });
+        Self { residual, stiffness: Lanes::splat(1.0) / softness, slip }
+    }
+
+    /// The changes when the velocities stay, to these changes of the products, and to ν of friction.
+    #[inline(always)]
+    fn standing(
+        &self,
+        bundle: &Bundle,
+        state: &State,
+        products: &[Lanes; 2],
+        centre: f64,
+        is_coulomb: bool,
+    ) -> Standing {
+        let [low, high] = [0, 1].map(|k| products[k] / state.room[k]);
+        let push = self.stiffness * (low - high - self.residual);
+        let friction = bundle.slip.as_ref().map_or([Lanes::ZERO; 2], |slip| {
+            let at = &self.slip;
+            let wider = (Lanes::splat(centre) / at.limit).max(at.least) - at.width;
+            let [k, wider] = [at.limit / (at.width + at.length), at.limit * wider / at.length];
+            let follows = if is_coulomb { slip.coefficient * push } else { Lanes::ZERO };
+            [0, 1].map(|i| wider * at.share[i] - k * at.slip[i] - follows * at.along[i])
+        });
+        Standing { push, friction }
+    }
+}
+
+impl Standing {
+    /// The change of the friction.
+    #[inline(always)]
+    fn added(&self, state: &State) -> [Lanes; 2] {
+        [0, 1].map(|k| self.friction[k] - state.friction[k])
+    }
+}
+
+/// The sum of `Jᵀ B J` over the rows of a batch, by columns.
+#[derive(Default)]
+struct Sum([[Lanes; 6]; 6]);
+
+impl Sum {
+    /// `push` is the decrease of the push with the gap, `follows` that of the friction with the
+    /// gap, and `slip` that of the friction with the slip: xx, xy, yy.
+    #[inline(always)]
+    fn add(&mut self, bundle: &Bundle, push: Lanes, follows: [Lanes; 2], slip: [Lanes; 3]) {
+        let normal = &bundle.normal;
+        match &bundle.slip {
+            None => {
+                // All rows of a batch are of this kind, and their sum is symmetric.
+                for (c, column) in self.0.iter_mut().enumerate() {
+                    let product = push * normal[c];
+                    for r in c..6 {
+                        column[r] += normal[r] * product;
+                    }
+                }
+            }
+            Some(slips) => {
+                let [x, y] = &slips.tangents;
+                for (c, column) in self.0.iter_mut().enumerate() {
+                    let products = [
+                        push * normal[c],
+                        follows[0] * normal[c] + slip[0] * x[c] + slip[1] * y[c],
+                        follows[1] * normal[c] + slip[1] * x[c] + slip[2] * y[c],
+                    ];
+                    for r in 0..6 {
+                        column[r] += normal[r] * products[0] + x[r] * products[1] + y[r] * products[2];
+                    }
+                }
+            }
+        }
+    }
+
+    fn total(&self, is_symmetric: bool) -> Matrix6<f64> {
+        let mut total = Matrix6::zeros();
+        for (c, column) in self.0.iter().enumerate() {
+            for r in 0..6 {
+                total[(r, c)] = if is_symmetric && r < c { total[(c, r)] } else { column[r].sum() };
+            }
+        }
+        total
     }
 }
