@@ -12,6 +12,7 @@
 //! their extents (the separating axis test). Contacts act that push along it. Where there is none,
 //! as of two boxes that are nearly at one place, one is added at the mean of the places, as deep as
 //! this overlap.
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
@@ -88,12 +89,12 @@ impl Surfaces {
 
     /// The contacts that act. `is_deep` tells whether a contact is that of a deep pair. The
     /// instances of `scene` have the poses at which the contacts were found.
-    pub fn acting(
+    pub fn acting<'a>(
         &self,
         scene: &Scene,
-        contacts: &[Contact],
+        contacts: &'a [Contact],
         is_deep: impl Fn(&Contact) -> bool,
-    ) -> Vec<Contact> {
+    ) -> Cow<'a, [Contact]> {
         let mut pushes: BTreeMap<[InstanceId; 2], Vec<Push>> = BTreeMap::new();
         let mut deep: BTreeSet<[InstanceId; 2]> = BTreeSet::new();
         for contact in contacts.iter().filter(|c| c.distance < 0.0) {
@@ -107,7 +108,7 @@ impl Surfaces {
         let of_faces = matches!(self.mode, Mode::Face | Mode::Exact);
         pushes.retain(|pair, pushes| deep.contains(pair) || of_faces && has_rear(pushes));
         if pushes.is_empty() {
-            return contacts.to_vec();
+            return Cow::Borrowed(contacts);
         }
         let way = |(pair, pushes): (&[InstanceId; 2], &Vec<Push>)| {
             (*pair, if deep.contains(pair) { self.way(scene, *pair, pushes) } else { None })
@@ -136,7 +137,7 @@ impl Surfaces {
                 Contact { point_a, point_b, normal, distance, instance_a, instance_b, ..first }
             }));
         }
-        acting
+        Cow::Owned(acting)
     }
 
     fn of(&self, scene: &Scene, instance: InstanceId) -> Option<(&Surface, Pose, f64)> {
@@ -363,9 +364,9 @@ mod tests {
             contact([1, 2], 0, up, -0.01),
         ];
         let acting = surfaces.acting(&scene, &found, |c| c.distance < -0.05);
-        assert_eq!(acting, [found[0], found[3], found[5], found[6], found[7]]);
+        assert_eq!(*acting, [found[0], found[3], found[5], found[6], found[7]]);
         // Across, the two bodies do not extend at all: that is the shortest way out.
         let found = [contact([0, 2], 0, up, -0.3), contact([2, 0], 0, aside, -0.2)];
-        assert_eq!(surfaces.acting(&scene, &found, |_| true), [found[1]]);
+        assert_eq!(*surfaces.acting(&scene, &found, |_| true), [found[1]]);
     }
 }

@@ -242,6 +242,9 @@ impl Newton {
             let bodies = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
             bodies.iter().flatten().filter_map(|&b| step.free_of[b]).for_each(|k| deep[k] = true);
         }
+        if !deep.contains(&true) {
+            return deep;
+        }
         for island in islands(step.free.len(), rows) {
             if island.bodies.iter().any(|&k| deep[k]) {
                 island.bodies.iter().for_each(|&k| deep[k] = true);
@@ -541,44 +544,48 @@ impl Newton {
     /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
         let all = contacts;
-        let contacts = &self.surfaces.acting(self.system.scene(), all, |c| self.is_deep(c));
-        let found = self.gaps(step).find(contacts, &step.poses);
-        let mut contact_rows: Vec<Row> = found.iter().map(|found| self.gaps(step).first_row(found)).collect();
+        let contacts = &*self.surfaces.acting(self.system.scene(), all, |c| self.is_deep(c));
+        let (found, mut first) = self.gaps(step).find(contacts, &step.poses);
+        self.gaps(step).begin(&found, &mut first);
         let joints = joint_rows(&self.gaps(step).bodies(), step.h);
-        let rows = [contact_rows.as_slice(), &joints].concat();
-        step.deep = self.deep(step, all, &rows);
+        first.extend_from_slice(&joints);
+        step.deep = self.deep(step, all, &first);
         let deep = step.deep.clone();
         // A deep body that is pushed into another one must not kick it, so what is detected again
         // says nothing about deep bodies.
         let stays = |row: &Row| row.sides.iter().flatten().any(|(k, _)| deep[*k]);
         // Where bodies overlap deeply, rigid contacts would contradict each other.
         let apart = self.apart(all);
-        for (row, found) in contact_rows.iter_mut().zip(&found).filter(|(row, _)| stays(row)) {
-            let parts = apart.contains(&pair(&found.contact));
+        for (row, found) in first.iter_mut().zip(&found).filter(|(row, _)| stays(row)) {
+            let parts = apart.contains(&pair(found.contact));
             row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
         }
-        let mut rows = [contact_rows.as_slice(), &joints].concat();
+        // Those of the contacts, then those of the joints.
+        let first = first;
+        let of_contacts = &first[..found.len()];
+        // Those of the last detection.
+        let mut later: Option<Vec<Row>> = None;
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut plain = Motion::new(&step.free, &step.target);
         let (mut velocities, mut forces) =
-            self.solve(step, &plain, &rows, Gap::Position, Guess { velocities: &start, forces: None });
+            self.solve(step, &plain, &first, Gap::Position, Guess { velocities: &start, forces: None });
         let count = step.free.len();
         let loads =
             |rows: &[Row], forces: &[RowForce]| Loads::new(count, rows, forces, rows.len() - joints.len());
         let from = Start { velocities: &start, h: step.h, whole: step.whole };
         let mut found_at = vec![Vector6::zeros(); count];
-        let mut stiffened = plain.stiffened(&loads(&rows, &forces), &found_at, &from);
+        let mut stiffened = plain.stiffened(&loads(&first, &forces), &found_at, &from);
         if let Some(motion) = &stiffened {
             (velocities, forces) =
-                self.solve(step, motion, &rows, Gap::Position, from_last(&velocities, &forces));
+                self.solve(step, motion, &first, Gap::Position, from_last(&velocities, &forces));
         }
         // The contacts at which bodies are hit, found where they are hit.
         let mut held: Vec<Row> = Vec::new();
-        if rows.iter().any(|row| !stays(row)) {
-            let beginning = self.gaps(step).beginning(contacts, &found);
+        if first.iter().any(|row| !stays(row)) {
+            let beginning = self.gaps(step).beginning(contacts, &found, of_contacts);
             let mut hit = match self.options.redetections {
                 0 => None,
-                _ => self.hit(step, &found, &velocities)?,
+                _ => self.hit(step, &found, of_contacts, &velocities)?,
             };
             let mut round = 0;
             while round < self.options.redetections {
@@ -601,14 +608,14 @@ impl Newton {
                 let mut next =
                     self.gaps(step).predicted_rows(contacts.as_slice(), &poses, &seen, &beginning, &is_hit);
                 next.retain(|row| !stays(row));
-                next.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
+                next.extend(of_contacts.iter().filter(|row| stays(row)).cloned());
                 next.extend_from_slice(&held);
                 next.extend_from_slice(&joints);
                 let of_joints = next.len() - joints.len()..;
                 predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
                 if let Some(hit) = hit {
                     let motion = stiffened.as_ref().unwrap_or(&plain);
-                    let guess = carry(&rows, &forces, &next);
+                    let guess = carry(later.as_ref().unwrap_or(&first), &forces, &next);
                     let (_, forces) =
                         self.solve(step, motion, &next, Gap::Position, from_last(&velocities, &guess));
                     held = hit.held(&next, &forces, stays);
@@ -616,18 +623,20 @@ impl Newton {
                 }
                 step.turn(&mut plain, &velocities);
                 found_at.clone_from(&velocities);
-                stiffened = plain.stiffened(&loads(&rows, &forces), &found_at, &from);
-                let guess = carry(&rows, &forces, &next);
-                rows = next;
+                let last = later.as_ref().unwrap_or(&first);
+                stiffened = plain.stiffened(&loads(last, &forces), &found_at, &from);
+                let guess = carry(last, &forces, &next);
+                let rows = &*later.insert(next);
                 let motion = stiffened.as_ref().unwrap_or(&plain);
                 let before = velocities;
                 (velocities, forces) =
-                    self.solve(step, motion, &rows, Gap::Position, from_last(&before, &guess));
+                    self.solve(step, motion, rows, Gap::Position, from_last(&before, &guess));
                 if self.farthest(step, &before, &velocities) < self.options.settled {
                     break;
                 }
             }
         }
+        let rows = later.unwrap_or(first);
         let of_joints = rows.len() - joints.len();
         let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
         self.close_joints(step, &mut solved, of_joints, &from);

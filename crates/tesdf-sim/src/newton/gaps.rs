@@ -40,12 +40,11 @@ pub struct Gaps<'a> {
     pub step: &'a Step,
 }
 
-/// A contact and what its gap depends on.
-pub struct Found {
-    /// With the normal of [`normals`].
-    pub contact: Contact,
-    /// The gap is the distance above the skin.
-    row: Row,
+/// A contact and what the gap of its row depends on.
+pub struct Found<'a> {
+    pub contact: &'a Contact,
+    /// That of [`normals`].
+    normal: DVec3,
     /// The way by which kinematic bodies open the gap in the step, m.
     carried: f64,
     /// The distance that the contact keeps, m.
@@ -67,9 +66,16 @@ struct Depths {
     pairs: BTreeMap<(InstanceId, InstanceId), f64>,
 }
 
-/// The contacts whose directions the predicted ones are averaged with, sorted by their features,
-/// and their points in the frame of *a*.
-struct Before<'a>(Vec<(&'a Found, DVec3)>);
+/// The contacts whose directions the predicted ones are averaged with, sorted by their features.
+struct Before<'a>(Vec<Earlier<'a>>);
+
+/// A contact at the beginning of the step.
+struct Earlier<'a> {
+    found: &'a Found<'a>,
+    row: &'a Row,
+    /// Its point in the frame of *a*.
+    point: DVec3,
+}
 
 impl<'a> Gaps<'a> {
     /// The bodies that rows connect.
@@ -78,34 +84,40 @@ impl<'a> Gaps<'a> {
         Bodies { system: self.system, free: &self.step.free, free_of: &self.step.free_of, softness }
     }
 
-    /// The contacts that were detected at `poses` and have a free body.
-    pub fn find(&self, contacts: &[Contact], poses: &[Pose]) -> Vec<Found> {
+    /// The contacts that were detected at `poses` and have a free body, and the row of each, whose
+    /// gap is the distance above the skin.
+    pub fn find<'c>(&self, contacts: &'c [Contact], poses: &[Pose]) -> (Vec<Found<'c>>, Vec<Row>) {
         let normals = match self.mode {
-            Mode::Node | Mode::Edge => normals(contacts),
+            Mode::Node | Mode::Edge => Some(normals(contacts)),
             // Those of the detection are in the normal cones.
-            Mode::Face | Mode::Exact => contacts.iter().map(|c| c.normal).collect(),
+            Mode::Face | Mode::Exact => None,
         };
-        let turned = contacts.iter().zip(normals).map(|(c, normal)| Contact { normal, ..*c });
-        turned.filter_map(|contact| self.found(contact, poses)).collect()
-    }
-
-    fn found(&self, contact: Contact, poses: &[Pose]) -> Option<Found> {
-        let [a, b] = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
-        let (a, b) = (a?, b?);
-        let mut row = Row::of_contact(&contact, &self.bodies(), poses, self.system.friction(a, b))?;
-        let [of_a, of_b] = [a, b].map(|body| self.velocity_at(body, poses, contact.point_a));
-        let carried = |body: usize, velocity: DVec3| match self.system.bodies()[body].mass {
-            Mass::Kinematic => self.step.h * velocity,
-            Mass::Fixed | Mass::Free(_) => DVec3::ZERO,
-        };
-        let carried = carried(a, of_a) - carried(b, of_b);
-        if let Some(friction) = &mut row.friction {
-            friction.way = carried.reject_from_normalized(contact.normal);
+        let (mut found, mut rows) =
+            (Vec::with_capacity(contacts.len()), Vec::with_capacity(contacts.len()));
+        for (k, contact) in contacts.iter().enumerate() {
+            let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);
+            let [a, b] = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
+            let (Some(a), Some(b)) = (a, b) else { continue };
+            let Some(mut row) = Row::of_contact(contact, normal, &self.bodies(), poses, self.system.friction(a, b))
+            else {
+                continue;
+            };
+            let [of_a, of_b] = [a, b].map(|body| self.velocity_at(body, poses, contact.point_a));
+            let carried = |body: usize, velocity: DVec3| match self.system.bodies()[body].mass {
+                Mass::Kinematic => self.step.h * velocity,
+                Mass::Fixed | Mass::Free(_) => DVec3::ZERO,
+            };
+            let carried = carried(a, of_a) - carried(b, of_b);
+            if let Some(friction) = &mut row.friction {
+                friction.way = carried.reject_from_normalized(normal);
+            }
+            let (skin, carried) = (self.skin(a, b), carried.dot(normal));
+            row.gap -= skin;
+            let way = self.step.h * (of_a - of_b).reject_from_normalized(normal).length();
+            rows.push(row);
+            found.push(Found { contact, normal, carried, skin, way });
         }
-        let (skin, carried) = (self.skin(a, b), carried.dot(contact.normal));
-        row.gap -= skin;
-        let way = self.step.h * (of_a - of_b).reject_from_normalized(contact.normal).length();
-        Some(Found { contact, row, carried, skin, way })
+        (found, rows)
     }
 
     /// The velocity of a body's point at the beginning of the step, m/s. `point` is given in the
@@ -120,27 +132,27 @@ impl<'a> Gaps<'a> {
         linear + angular.cross(point - center)
     }
 
-    /// The row of a contact at the beginning of the step.
-    pub fn first_row(&self, found: &Found) -> Row {
-        let mut row = found.row.clone();
-        let depth = (-row.gap).max(0.0);
-        row.relaxed_gap = row.gap + depth + found.carried;
-        row.gap = row.relaxed_gap - self.lift(depth, found);
-        row
+    /// Gives the rows of contacts that were found the gaps of the beginning of the step.
+    pub fn begin(&self, found: &[Found<'_>], rows: &mut [Row]) {
+        for (found, row) in found.iter().zip(rows) {
+            let depth = (-row.gap).max(0.0);
+            row.relaxed_gap = row.gap + depth + found.carried;
+            row.gap = row.relaxed_gap - self.lift(depth, found);
+        }
     }
 
     /// For each free body: the share of the step after which it is hit, when it is where these
     /// contacts were found and goes on with the velocities of `target`. Only contacts count that
     /// close by more than `far` of the smaller body's size in the step. Infinite without any.
-    pub fn shares(&self, found: &[Found], target: &[Vector6<f64>], far: f64) -> Vec<f64> {
+    pub fn shares(&self, found: &[Found<'_>], rows: &[Row], target: &[Vector6<f64>], far: f64) -> Vec<f64> {
         let mut shares = vec![f64::INFINITY; self.step.free.len()];
-        for Found { contact, row, .. } in found {
+        for (Found { contact, skin, .. }, row) in found.iter().zip(rows) {
             let bodies = [contact.instance_a, contact.instance_b].into_iter();
             let sizes = bodies.filter_map(|id| Some(self.sizes[self.system.body_of(id)?]));
             let way = -self.step.h * row.rate(target);
             if way > far * sizes.fold(f64::INFINITY, f64::min) {
                 for (k, _) in row.sides.iter().flatten() {
-                    shares[*k] = shares[*k].min(row.gap.max(0.0) / way);
+                    shares[*k] = shares[*k].min((contact.distance - skin).max(0.0) / way);
                 }
             }
         }
@@ -158,20 +170,21 @@ impl<'a> Gaps<'a> {
         Beginning { depths, before }: &Beginning<'_>,
         is_hit: &[bool],
     ) -> Vec<Row> {
-        let row = |found: Found| {
-            let mut row = found.row.clone();
-            if let Some(before) = before.of(&found.contact, self.point_of_a(&found.contact, poses)?) {
+        let (found, mut rows) = self.find(contacts, poses);
+        for (found, row) in found.iter().zip(&mut rows) {
+            let point = self.point_of_a(found.contact, poses);
+            if let Some(before) = point.and_then(|point| before.of(found, point)) {
                 // Where a body slides along a face, the contact before may be that of another corner.
-                let turns = before.contact.normal.distance(found.contact.normal) > SAME_NORMAL;
+                let turns = before.found.normal.distance(found.normal) > SAME_NORMAL;
                 if turns && !row.sides.iter().flatten().any(|(k, _)| is_hit[*k]) {
-                    row.average(&before.row);
+                    row.average(before.row);
                 }
             }
             let gap = row.gap - self.step.h * row.rate(velocities);
             // A face may have several contacts, and its deepest one is not at this place. The body
             // must not sink in here by the depth there.
-            let depth = depths.of(&found).min(-gap).max(0.0);
-            row.gap = gap + depth - self.lift(depth, &found);
+            let depth = depths.of(found).min(-gap).max(0.0);
+            row.gap = gap + depth - self.lift(depth, found);
             row.relaxed_gap = gap + depth;
             if self.mode != Mode::Node {
                 // Where a body crosses an edge, the gap at the beginning is below the plane of the
@@ -180,27 +193,34 @@ impl<'a> Gaps<'a> {
                 // never gained.
                 row.relaxed_gap = row.relaxed_gap.max(found.carried.min(0.0));
             }
-            Some(row)
-        };
-        self.find(contacts, poses).into_iter().filter_map(row).collect()
+        }
+        rows
     }
 
     /// What [`predicted_rows`](Self::predicted_rows) needs of the `contacts` at the beginning of
-    /// the step. Those in `found` have a free body.
-    pub fn beginning<'f>(&self, contacts: &[Contact], found: &'f [Found]) -> Beginning<'f> {
-        Beginning { depths: self.depths(contacts), before: self.before(found) }
+    /// the step. Those in `found` have a free body, and these rows.
+    pub fn beginning<'f>(
+        &self,
+        contacts: &[Contact],
+        found: &'f [Found<'f>],
+        rows: &'f [Row],
+    ) -> Beginning<'f> {
+        Beginning { depths: self.depths(contacts), before: self.before(found, rows) }
     }
 
     /// With the directions of the end alone, a body that crosses an edge is braked or driven on by
     /// it; the mean over the step does neither. Contacts of vertices stay as they are: for gears
     /// the mean was worse.
-    fn before<'f>(&self, found: &'f [Found]) -> Before<'f> {
+    fn before<'f>(&self, found: &'f [Found<'f>], rows: &'f [Row]) -> Before<'f> {
         if self.mode == Mode::Node {
             return Before(Vec::new());
         }
-        let point = |f: &'f Found| Some((f, self.point_of_a(&f.contact, &self.step.poses)?));
-        let mut before: Vec<_> = found.iter().filter_map(point).collect();
-        before.sort_by_key(|(found, _)| feature(&found.contact));
+        let earlier = |(found, row): (&'f Found<'f>, &'f Row)| {
+            let point = self.point_of_a(found.contact, &self.step.poses)?;
+            Some(Earlier { found, row, point })
+        };
+        let mut before: Vec<_> = found.iter().zip(rows).filter_map(earlier).collect();
+        before.sort_by_key(|earlier| feature(earlier.found.contact));
         Before(before)
     }
 
@@ -228,7 +248,7 @@ impl<'a> Gaps<'a> {
     }
 
     /// The distance by which the step lifts a contact that is `depth` metres below its skin.
-    fn lift(&self, depth: f64, &Found { skin, way, .. }: &Found) -> f64 {
+    fn lift(&self, depth: f64, &Found { skin, way, .. }: &Found<'_>) -> f64 {
         let NewtonOptions { correction, correction_speed, .. } = *self.options;
         let penetration = (depth - skin).max(0.0);
         let removed = (correction * penetration).min(correction_speed * self.step.h);
@@ -243,22 +263,21 @@ impl<'a> Gaps<'a> {
 }
 
 impl<'a> Before<'a> {
-    /// The contact of the same face of *a* whose point is nearest to that of `contact`, which is
+    /// The contact of the same face of *a* whose point is nearest to that of another one, which is
     /// `point` in the frame of *a*.
-    fn of(&self, contact: &Contact, point: DVec3) -> Option<&'a Found> {
+    fn of(&self, Found { contact, normal, .. }: &Found<'_>, point: DVec3) -> Option<&Earlier<'a>> {
         let key = feature(contact);
-        let first = self.0.partition_point(|(f, _)| feature(&f.contact) < key);
-        let same = self.0[first..].iter().take_while(|(f, _)| feature(&f.contact) == key);
-        let same = same.filter(|(f, _)| f.contact.normal.dot(contact.normal) > SAME_SURFACE);
-        let nearest = same.min_by(|(_, p), (_, q)| p.distance(point).total_cmp(&q.distance(point)));
-        nearest.map(|(found, _)| *found)
+        let first = self.0.partition_point(|e| feature(e.found.contact) < key);
+        let same = self.0[first..].iter().take_while(|e| feature(e.found.contact) == key);
+        let same = same.filter(|e| e.found.normal.dot(*normal) > SAME_SURFACE);
+        same.min_by(|p, q| p.point.distance(point).total_cmp(&q.point.distance(point)))
     }
 }
 
 impl Depths {
     /// Depth of the feature that a contact belongs to, m. Within the skin it is at least that of
     /// the pair: contacts come and go there, and one that comes must not lift the bodies.
-    fn of(&self, Found { contact, skin, .. }: &Found) -> f64 {
+    fn of(&self, Found { contact, skin, .. }: &Found<'_>) -> f64 {
         let (a, b) = (contact.instance_a, contact.instance_b);
         let key = (a, b, contact.feature.a);
         let of_feature =

@@ -33,16 +33,17 @@ pub struct Hit {
 }
 
 impl Newton {
-    /// The bodies that contacts in `found` let meet fast. `otherwise` are the velocities of the
+    /// The bodies that contacts in `found`, with these rows, let meet fast. `otherwise` are the velocities of the
     /// others. `None` when there are none.
     pub(super) fn hit(
         &mut self,
         step: &mut Step,
-        found: &[Found],
+        found: &[Found<'_>],
+        rows: &[Row],
         otherwise: &[Vector6<f64>],
     ) -> Result<Option<Hit>, DynamicsError> {
         let target = step.target.clone();
-        let mut shares = self.gaps(step).shares(found, &target, FAR);
+        let mut shares = self.gaps(step).shares(found, rows, &target, FAR);
         let mut hit = Hit { is_hit: vec![false; shares.len()], velocities: otherwise.to_vec() };
         for _ in 0..ADVANCES {
             for (k, share) in shares.iter().enumerate() {
@@ -56,8 +57,8 @@ impl Newton {
             let predicted = self.moved(step, &hit.velocities);
             let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
             let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-            let found = self.gaps(step).find(contacts.as_slice(), &poses);
-            let more = self.gaps(step).shares(&found, &target, FAR);
+            let (found, rows) = self.gaps(step).find(contacts.as_slice(), &poses);
+            let more = self.gaps(step).shares(&found, &rows, &target, FAR);
             let mut most = 0.0f64;
             for ((share, more), _) in shares.iter_mut().zip(more).zip(&hit.is_hit).filter(|(_, hit)| **hit) {
                 most = most.max(more.min(1.0 - *share));

@@ -148,9 +148,10 @@ impl Row {
     /// body is free.
     ///
     /// `poses` are the poses at which the contact was detected, and `coefficient` is that of
-    /// friction.
+    /// friction. It acts along `normal`.
     pub fn of_contact(
         contact: &Contact,
+        normal: DVec3,
         bodies: &Bodies<'_>,
         poses: &[Pose],
         coefficient: f64,
@@ -167,9 +168,9 @@ impl Row {
         let side = |k: usize, direction: DVec3| {
             points[k].map(|(free, arm)| (free, pack(direction, arm.cross(direction))))
         };
-        let sides = [side(0, contact.normal), side(1, -contact.normal)];
+        let sides = [side(0, normal), side(1, -normal)];
         let weight = Self::weight(&sides, free);
-        let friction = Friction { normal: contact.normal, coefficient, way: DVec3::ZERO };
+        let friction = Friction { normal, coefficient, way: DVec3::ZERO };
         (weight > 0.0).then(|| Self {
             id: RowId::Contact([contact.instance_a, contact.instance_b], contact.feature.a),
             sides,
