@@ -294,7 +294,8 @@ impl Newton {
         // Rows that part bodies in place of those that were found.
         let mut parting = Vec::new();
         if matches!(gap, Gap::Position) {
-            let parts = island.rows.iter().map(|&k| &rows[k]).filter(|row| row.resistance == Resistance::Parting);
+            let parts =
+                island.rows.iter().map(|&k| &rows[k]).filter(|row| row.resistance == Resistance::Parting);
             parting.extend(parts.map(Row::parting));
         }
         let mut parting = parting.iter();

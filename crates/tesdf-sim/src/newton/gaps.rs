@@ -7,7 +7,7 @@ use tesdf::collide::{Contact, InstanceId, Mode, Pose};
 
 use super::NewtonOptions;
 use super::normals::normals;
-use super::rows::{Bodies, Row};
+use super::rows::{Bodies, Center, Row};
 use super::step::Step;
 use crate::{Mass, State, System};
 
@@ -53,6 +53,33 @@ pub struct Found<'a> {
     way: f64,
 }
 
+/// What the contacts of two instances have in common.
+struct Pair {
+    centers: [Option<Center>; 2],
+    /// Coefficient of friction.
+    friction: f64,
+    skin: f64,
+    motions: [BodyMotion; 2],
+}
+
+/// The motion of a body.
+struct BodyMotion {
+    /// Of the centre, m/s.
+    linear: DVec3,
+    /// rad/s
+    angular: DVec3,
+    /// m
+    center: DVec3,
+    is_kinematic: bool,
+}
+
+impl BodyMotion {
+    /// The velocity of a point of the body, m/s.
+    fn at(&self, point: DVec3) -> DVec3 {
+        self.linear + self.angular.cross(point - self.center)
+    }
+}
+
 /// What predicted gaps need of the contacts at the beginning of the step.
 pub struct Beginning<'a> {
     depths: Depths,
@@ -80,8 +107,7 @@ struct Earlier<'a> {
 impl<'a> Gaps<'a> {
     /// The bodies that rows connect.
     pub fn bodies(&self) -> Bodies<'a> {
-        let softness = self.step.h * self.step.h / self.options.stiffness;
-        Bodies { system: self.system, free: &self.step.free, free_of: &self.step.free_of, softness }
+        Bodies { system: self.system, free_of: &self.step.free_of }
     }
 
     /// The contacts that were detected at `poses` and have a free body, and the row of each, whose
@@ -92,44 +118,68 @@ impl<'a> Gaps<'a> {
             // Those of the detection are in the normal cones.
             Mode::Face | Mode::Exact => None,
         };
-        let (mut found, mut rows) =
-            (Vec::with_capacity(contacts.len()), Vec::with_capacity(contacts.len()));
+        let (mut found, mut rows) = (Vec::with_capacity(contacts.len()), Vec::with_capacity(contacts.len()));
+        let mut last: Option<(InstanceId, InstanceId, Pair)> = None;
         for (k, contact) in contacts.iter().enumerate() {
             let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);
-            let [a, b] = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
-            let (Some(a), Some(b)) = (a, b) else { continue };
-            let Some(mut row) = Row::of_contact(contact, normal, &self.bodies(), poses, self.system.friction(a, b))
+            let (a, b) = (contact.instance_a, contact.instance_b);
+            // The contacts of a pair come together.
+            let pair = match &last {
+                Some((c, d, pair)) if (*c, *d) == (a, b) => pair,
+                _ => {
+                    let Some(pair) = self.pair(a, b, poses) else { continue };
+                    &last.insert((a, b, pair)).2
+                }
+            };
+            let Pair { centers, friction, skin, motions } = pair;
+            let Some(mut row) = Row::of_contact(contact, normal, centers, *friction, self.options.stiffness)
             else {
                 continue;
             };
-            let [of_a, of_b] = [a, b].map(|body| self.velocity_at(body, poses, contact.point_a));
-            let carried = |body: usize, velocity: DVec3| match self.system.bodies()[body].mass {
-                Mass::Kinematic => self.step.h * velocity,
-                Mass::Fixed | Mass::Free(_) => DVec3::ZERO,
+            let at = |motion: &BodyMotion| motion.at(contact.point_a);
+            let carried = |motion: &BodyMotion| {
+                if motion.is_kinematic { self.step.h * at(motion) } else { DVec3::ZERO }
             };
-            let carried = carried(a, of_a) - carried(b, of_b);
+            let carried = carried(&motions[0]) - carried(&motions[1]);
             if let Some(friction) = &mut row.friction {
                 friction.way = carried.reject_from_normalized(normal);
             }
-            let (skin, carried) = (self.skin(a, b), carried.dot(normal));
             row.gap -= skin;
-            let way = self.step.h * (of_a - of_b).reject_from_normalized(normal).length();
+            let slip = (at(&motions[0]) - at(&motions[1])).reject_from_normalized(normal);
+            let (carried, way) = (carried.dot(normal), self.step.h * slip.length());
             rows.push(row);
-            found.push(Found { contact, normal, carried, skin, way });
+            found.push(Found { contact, normal, carried, skin: *skin, way });
         }
         (found, rows)
     }
 
-    /// The velocity of a body's point at the beginning of the step, m/s. `point` is given in the
-    /// world while the bodies are at `poses`.
-    fn velocity_at(&self, body: usize, poses: &[Pose], point: DVec3) -> DVec3 {
-        let State { linear, angular, .. } = self.system.states()[body];
-        let center = match self.system.bodies()[body].mass {
-            Mass::Free(mass) => poses[body].to_world(mass.center),
-            Mass::Kinematic => poses[body].translation,
-            Mass::Fixed => return DVec3::ZERO,
+    /// What contacts of these instances, found at `poses`, have in common.
+    fn pair(&self, a: InstanceId, b: InstanceId, poses: &[Pose]) -> Option<Pair> {
+        let bodies = [self.system.body_of(a)?, self.system.body_of(b)?];
+        let center = |body: usize| match self.system.bodies()[body].mass {
+            Mass::Free(mass) => {
+                Some(Center { free: self.step.free_of[body]?, place: poses[body].to_world(mass.center) })
+            }
+            Mass::Fixed | Mass::Kinematic => None,
         };
-        linear + angular.cross(point - center)
+        Some(Pair {
+            centers: bodies.map(center),
+            friction: self.system.friction(bodies[0], bodies[1]),
+            skin: self.skin(bodies[0], bodies[1]),
+            motions: bodies.map(|body| self.motion(body, poses)),
+        })
+    }
+
+    /// The motion of a body that is at `poses`, with the velocities of the beginning of the step.
+    fn motion(&self, body: usize, poses: &[Pose]) -> BodyMotion {
+        let State { linear, angular, .. } = self.system.states()[body];
+        let (linear, angular, center) = match self.system.bodies()[body].mass {
+            Mass::Free(mass) => (linear, angular, poses[body].to_world(mass.center)),
+            Mass::Kinematic => (linear, angular, poses[body].translation),
+            Mass::Fixed => (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO),
+        };
+        let is_kinematic = self.system.bodies()[body].mass == Mass::Kinematic;
+        BodyMotion { linear, angular, center, is_kinematic }
     }
 
     /// Gives the rows of contacts that were found the gaps of the beginning of the step.

@@ -155,7 +155,7 @@ mod tests {
 
     use super::*;
     use crate::MassProperties;
-    use crate::newton::rows::RowId;
+    use crate::newton::rows::{RowId, Stiffness};
 
     fn pull(arm: DVec3, resistance: Resistance) -> Row {
         let side = Some((0, Vector6::new(0.0, 0.0, 1.0, arm.y, -arm.x, 0.0)));
@@ -165,7 +165,7 @@ mod tests {
             arms: [arm, DVec3::ZERO],
             gap: 0.0,
             relaxed_gap: 0.0,
-            stiffness: 1.0,
+            stiffness: Stiffness::Relative(1.0),
             bounds: [0.0, f64::INFINITY],
             resistance,
             friction: None,

@@ -132,7 +132,8 @@ impl Interior<'_> {
             }
         }
         let has_friction = self.has_friction();
-        let mut found = Iterate::cold(self).descend(Limits::Coulomb, if has_friction { COLD } else { CONVEX });
+        let mut found =
+            Iterate::cold(self).descend(Limits::Coulomb, if has_friction { COLD } else { CONVEX });
         iterations += found.iterations;
         if found.converged || !has_friction {
             return Solution { iterations, ..found };

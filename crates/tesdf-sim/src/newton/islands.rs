@@ -59,7 +59,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::newton::rows::{Resistance, RowId};
+    use crate::newton::rows::{Resistance, RowId, Stiffness};
 
     fn row(a: Option<usize>, b: Option<usize>) -> Row {
         let side = |k: Option<usize>| k.map(|k| (k, Vector6::zeros()));
@@ -69,7 +69,7 @@ mod tests {
             sides: [side(a), side(b)],
             gap: 0.0,
             relaxed_gap: 0.0,
-            stiffness: 1.0,
+            stiffness: Stiffness::Relative(1.0),
             bounds: [0.0, f64::INFINITY],
             resistance: Resistance::Rigid,
             friction: None,

@@ -8,7 +8,7 @@ use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
 use super::integrate::pack;
-use super::rows::{Bodies, PUSHES, Resistance, Row, RowId};
+use super::rows::{Bodies, PUSHES, Resistance, Row, RowId, Stiffness};
 use crate::joint::{axes, rotation_between, swing, wrapped};
 use crate::{Drive, Joint, JointKind, Mass, System};
 
@@ -164,7 +164,7 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
         arms,
         gap,
         relaxed_gap: gap,
-        stiffness: measure.stiffness.unwrap_or(0.0),
+        stiffness: Stiffness::Absolute(measure.stiffness.unwrap_or(0.0)),
         bounds: measure.bounds,
         resistance: measure.resistance,
         friction: None,

@@ -14,7 +14,7 @@ use super::integrate::pack;
 use super::lanes::{Lanes, WIDTH};
 use super::linear::Pattern;
 use super::relative::Relative;
-use super::rows::{Resistance, Row, RowForce};
+use super::rows::{Resistance, Row, RowForce, Stiffness};
 
 /// Rigid rows give way by this share of the way by which their force would move their bodies in the
 /// step: 1 / κ∞. It lets rows that contradict each other have a solution, and bounds the numbers in
@@ -185,8 +185,7 @@ impl Lines {
         // One of the sides has a body.
         let body = row.bodies[reference].unwrap_or_default();
         let other = row.bodies[1 - reference];
-        let offset =
-            other.map_or(DVec3::ZERO, |_| row.row.arms[1 - reference] - row.row.arms[reference]);
+        let offset = other.map_or(DVec3::ZERO, |_| row.row.arms[1 - reference] - row.row.arms[reference]);
         let is_same = |group: &Relative| {
             group.body == body
                 && group.other.map(|other| other.body) == other
@@ -264,13 +263,17 @@ impl Bundle {
         self.gap.0[lane] = scale * placed.gap;
         self.compliance.0[lane] = match placed.resistance {
             Resistance::Rigid => RIGID,
-            Resistance::Spring | Resistance::Parting => scale * scale / row.stiffness,
+            Resistance::Spring | Resistance::Parting => match row.stiffness {
+                Stiffness::Absolute(stiffness) => scale * scale / stiffness,
+                Stiffness::Relative(stiffness) => 1.0 / stiffness,
+            },
         };
         self.bounds.iter_mut().zip(row.bounds).for_each(|(to, bound)| to.0[lane] = bound / scale);
         self.scale.0[lane] = scale;
         if let (Some(slip), Some(friction)) = (&mut self.slip, &row.friction) {
             let along = tangents(friction.normal).map(|t| {
-                let side = |k: usize, sign: f64| Some((placed.bodies[k]?, sign * pack(t, row.arms[k].cross(t))));
+                let side =
+                    |k: usize, sign: f64| Some((placed.bodies[k]?, sign * pack(t, row.arms[k].cross(t))));
                 [side(0, 1.0), side(1, -1.0)]
             });
             let of_slip = bodies.scale(along.iter().map(|sides| bodies.weight(sides)).sum::<f64>() / 2.0);

@@ -5,7 +5,7 @@ use nalgebra::{Matrix6, Vector6};
 use super::interior::{Interior, Solution};
 use super::line::{Bodies, Lines, Placed};
 use super::linear::Pattern;
-use super::rows::{Resistance, RowForce};
+use super::rows::{Resistance, RowForce, RowId};
 
 /// Bodies, the rows between them, and the velocities without rows.
 #[derive(Debug)]
@@ -72,7 +72,8 @@ impl<'a> Problem<'a> {
 
     /// The problem whose contacts are springs.
     pub fn softened(mut self) -> Self {
-        for placed in self.rows.iter_mut().filter(|placed| placed.row.is_contact()) {
+        let is_contact = |placed: &&mut Placed<'_>| matches!(placed.row.id, RowId::Contact(..));
+        for placed in self.rows.iter_mut().filter(is_contact) {
             placed.resistance = Resistance::Spring;
         }
         self
@@ -90,9 +91,8 @@ impl<'a> Problem<'a> {
         let (free, at_start) = (gaps(target), gaps(&start));
         let change = |k: usize| (at_start[k] - free[k]).abs();
         let of_all = NEAR_OF_ALL * (0..self.rows.len()).map(change).fold(0.0, f64::max);
-        let is_near = |k: usize| {
-            !self.rows[k].row.is_contact() || at_start[k] <= f64::max(NEAR * change(k), of_all)
-        };
+        let is_near =
+            |k: usize| !self.rows[k].row.is_contact() || at_start[k] <= f64::max(NEAR * change(k), of_all);
         let has_force = |k: usize| guess.is_some_and(|guess| guess[k].along != 0.0);
         let may_act = |k: &usize| !is_given(&self.rows[*k]) && (has_force(*k) || is_near(*k));
         let mut acts: Vec<bool> = (0..self.rows.len()).map(|k| may_act(&k)).collect();
@@ -158,7 +158,7 @@ mod tests {
     use crate::MassProperties;
     use crate::newton::integrate::{pack, unpack};
     use crate::newton::interior::LAG;
-    use crate::newton::rows::{FreeBody, Friction, PUSHES, Row, RowId};
+    use crate::newton::rows::{FreeBody, Friction, PUSHES, Row, Stiffness};
 
     const H: f64 = 1e-3;
 
@@ -188,7 +188,7 @@ mod tests {
                 arms,
                 gap,
                 relaxed_gap: gap,
-                stiffness: 30.0 / (H * H),
+                stiffness: Stiffness::Absolute(30.0 / (H * H)),
                 bounds: PUSHES,
                 resistance: Resistance::Rigid,
                 friction: (coefficient > 0.0).then_some(Friction {
@@ -236,10 +236,11 @@ mod tests {
             }
             let gap = row.gap + H * row.rate(&found.velocity);
             // A force that a spring with this kept force has again.
-            let per_gap = 1.0 / (H * H * Row::weight(&row.sides, free));
+            let of_side = |(body, j): &(usize, Vector6<f64>)| j.dot(&(free[*body].inverse * j));
+            let per_gap = 1.0 / (H * H * row.sides.iter().flatten().map(of_side).sum::<f64>());
             let again = match row.resistance {
                 Resistance::Rigid => force.along - per_gap * gap,
-                Resistance::Spring | Resistance::Parting => -row.stiffness * gap,
+                Resistance::Spring | Resistance::Parting => -30.0 / (H * H) * gap,
             };
             let off = (again.clamp(row.bounds[0], row.bounds[1]) - force.along) / per_gap;
             if off.abs() > 1e-9 {

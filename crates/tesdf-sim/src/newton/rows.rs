@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 use tesdf::collide::{Contact, InstanceId, Pose};
 
 use super::integrate::pack;
-use crate::{Mass, MassProperties, System};
+use crate::{MassProperties, System};
 
 /// A free body and its inertia, in the middle of its free rotation in a step.
 #[derive(Clone, Debug)]
@@ -72,8 +72,8 @@ pub struct Row {
     pub gap: f64,
     /// The gap without the correction that pushes penetrating bodies apart.
     pub relaxed_gap: f64,
-    /// Stiffness K of a spring, N/m or N m/rad.
-    pub stiffness: f64,
+    /// Of a spring.
+    pub stiffness: Stiffness,
     /// The least and the greatest force, N or N m; positive forces open the gap. A contact pushes
     /// only: 0 to infinity.
     pub bounds: [f64; 2],
@@ -94,6 +94,15 @@ pub struct Friction {
     /// The way in the step that kinematic bodies add to that of the free ones, in the tangent
     /// plane, m.
     pub way: DVec3,
+}
+
+/// The stiffness of a spring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stiffness {
+    /// N/m or N m/rad
+    Absolute(f64),
+    /// κ: as a multiple of that which the inertia of the bodies gives within the step, `1 / (w h²)`.
+    Relative(f64),
 }
 
 /// How a row resists.
@@ -139,45 +148,34 @@ impl Row {
         }
     }
 
-    /// J M⁻¹ Jᵀ: the rate that an impulse of 1 causes.
-    pub fn weight(sides: &[Option<(usize, Vector6<f64>)>; 2], free: &[FreeBody]) -> f64 {
-        sides.iter().flatten().map(|(k, j)| j.dot(&(free[*k].inverse * j))).sum()
-    }
-
-    /// The row of a contact, with the contact's distance as its gap. Returns `None` when neither
-    /// body is free.
-    ///
-    /// `poses` are the poses at which the contact was detected, and `coefficient` is that of
-    /// friction. It acts along `normal`.
+    /// The row of a contact between two bodies, with the contact's distance as its gap. Returns
+    /// `None` when neither body is free. It acts along `normal`, with this coefficient of friction.
     pub fn of_contact(
         contact: &Contact,
         normal: DVec3,
-        bodies: &Bodies<'_>,
-        poses: &[Pose],
+        bodies: &[Option<Center>; 2],
         coefficient: f64,
+        stiffness: f64,
     ) -> Option<Self> {
-        let Bodies { system, free, free_of, softness } = *bodies;
-        let of = |instance| {
-            let body = system.body_of(instance)?;
-            let Mass::Free(mass) = system.bodies()[body].mass else { return None };
+        let side = |k: usize, direction: DVec3| {
+            let Center { free, place } = bodies[k]?;
             // Both sides use one point. The closest points lie on a line along the normal, so the
             // rate is the rate of the distance.
-            Some((free_of[body]?, contact.point_a - poses[body].to_world(mass.center)))
-        };
-        let points = [of(contact.instance_a), of(contact.instance_b)];
-        let side = |k: usize, direction: DVec3| {
-            points[k].map(|(free, arm)| (free, pack(direction, arm.cross(direction))))
+            let arm = contact.point_a - place;
+            Some((arm, (free, pack(direction, arm.cross(direction)))))
         };
         let sides = [side(0, normal), side(1, -normal)];
-        let weight = Self::weight(&sides, free);
+        if sides == [None; 2] {
+            return None;
+        }
         let friction = Friction { normal, coefficient, way: DVec3::ZERO };
-        (weight > 0.0).then(|| Self {
+        Some(Self {
             id: RowId::Contact([contact.instance_a, contact.instance_b], contact.feature.a),
-            sides,
-            arms: points.map(|point| point.map_or(DVec3::ZERO, |(_, arm)| arm)),
+            sides: sides.map(|side| side.map(|(_, side)| side)),
+            arms: sides.map(|side| side.map_or(DVec3::ZERO, |(arm, _)| arm)),
             gap: contact.distance,
             relaxed_gap: contact.distance,
-            stiffness: 1.0 / (weight * softness),
+            stiffness: Stiffness::Relative(stiffness),
             bounds: PUSHES,
             resistance: Resistance::Rigid,
             friction: (coefficient > 0.0).then_some(friction),
@@ -185,17 +183,22 @@ impl Row {
     }
 }
 
+/// The centre of mass of a free body.
+#[derive(Clone, Copy, Debug)]
+pub struct Center {
+    /// Its index in the list of free bodies.
+    pub free: usize,
+    /// In the world, m.
+    pub place: DVec3,
+}
+
 /// The bodies that rows connect.
 #[derive(Clone, Copy, Debug)]
 pub struct Bodies<'a> {
     /// All bodies.
     pub system: &'a System,
-    /// The free ones.
-    pub free: &'a [FreeBody],
-    /// For each body its index in `free`; `None` when it is not free.
+    /// For each body its index in the list of free bodies; `None` when it is not free.
     pub free_of: &'a [Option<usize>],
-    /// h² / κ, s².
-    pub softness: f64,
 }
 
 /// The forces of the rows `before` for rows of the same ids, in the order in which these come.

@@ -284,8 +284,7 @@ impl<'a> Iterate<'a> {
         for batch in &lines.batches {
             let group = &lines.groups[batch.group];
             let relative = group.of(&self.velocity);
-            let (mut sum, mut acting, mut change) =
-                (Sum::default(), [Lanes::ZERO; 6], [Lanes::ZERO; 6]);
+            let (mut sum, mut acting, mut change) = (Sum::default(), [Lanes::ZERO; 6], [Lanes::ZERO; 6]);
             for k in batch.bundles.clone() {
                 let (bundle, state) = (&lines.bundles[k], &mut self.states[k]);
                 let local = Local::new(bundle, state, &relative, limits, k, self.centre, width);
@@ -340,13 +339,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// The change of all unknowns with the momentum `brought`.
-    fn follow(
-        &self,
-        factor: &Factor<'_>,
-        brought: &[Vector6<f64>],
-        is_coulomb: bool,
-        to: &mut Direction,
-    ) {
+    fn follow(&self, factor: &Factor<'_>, brought: &[Vector6<f64>], is_coulomb: bool, to: &mut Direction) {
         let lines = self.of.lines;
         to.velocity = factor.solve(brought);
         to.rows.resize(lines.bundles.len(), Change::default());
@@ -459,8 +452,7 @@ impl<'a> Iterate<'a> {
 
     /// The greatest gap and force that do not fit, m.
     fn open(&self) -> f64 {
-        let of_bundle =
-            |(local, bundle): (&Local, &Bundle)| local.residual.map(f64::abs) / bundle.scale;
+        let of_bundle = |(local, bundle): (&Local, &Bundle)| local.residual.map(f64::abs) / bundle.scale;
         let greatest = self.locals.iter().zip(&self.of.lines.bundles).map(of_bundle);
         greatest.fold(Lanes::ZERO, Lanes::max).0.into_iter().fold(0.0, f64::max)
     }
