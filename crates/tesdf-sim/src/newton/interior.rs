@@ -192,7 +192,7 @@ impl Interior<'_> {
     /// The way that this momentum gives, m.
     fn way_of_momentum(&self, momentum: &[Vector6<f64>]) -> f64 {
         let rates: Vec<_> =
-            self.bodies.inverse.iter().zip(momentum).map(|(inverse, p)| inverse * p).collect();
+            self.bodies.inverse.iter().zip(momentum).map(|(inverse, p)| inverse.times(p)).collect();
         self.way(&rates)
     }
 

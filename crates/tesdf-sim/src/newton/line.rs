@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::DVec3;
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::integrate::pack;
 use super::lanes::{Lanes, WIDTH};
@@ -19,8 +19,9 @@ use super::rows::{Resistance, Row, RowForce, Stiffness};
 /// Rigid rows give way by this share of the way by which their force would move their bodies in the
 /// step: 1 / κ∞. It lets rows that contradict each other have a solution, and bounds the numbers in
 /// the matrix. With 1e-10, the links of a chain whose end weighs a thousand times as much as a link
-/// gave way by 25 pm, enough for contacts at the bottom of a bend to let go.
-const RIGID: f64 = 1e-12;
+/// gave way by 25 pm, enough for contacts at the bottom of a bend to let go. With 1e-12 a wall of
+/// bricks sank by 2 fm a step, unevenly, and rose again where it tilted: it gained 2e-9 J in 10 s.
+const RIGID: f64 = 1e-13;
 
 /// Rows are of one group when the vectors between the centres of their bodies differ by less than
 /// this share of the smaller body. They differ where rows are from poses at different times.
@@ -31,14 +32,21 @@ const SAME_OFFSET: f64 = 1e-9;
 pub struct Bodies {
     /// Mass and inertia in the world frame, as [`FreeBody::inertia`](super::rows::FreeBody).
     pub inertia: Vec<Matrix6<f64>>,
-    /// The inverses of `inertia`.
-    pub inverse: Vec<Matrix6<f64>>,
+    /// The inverses of mass and inertia.
+    pub inverse: Vec<Inverse>,
     /// Velocities without rows.
     pub target: Vec<Vector6<f64>>,
     /// The length at which a body's rotation counts as a way, m.
     pub levers: Vec<f64>,
     /// The duration of the step, s.
     pub time_step: f64,
+}
+
+/// The inverse of a mass, and of an inertia in the world frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Inverse {
+    mass: f64,
+    inertia: Matrix3<f64>,
 }
 
 /// A row of an island.
@@ -113,6 +121,23 @@ pub struct Lines {
     of_pair: BTreeMap<(usize, usize), Vec<usize>>,
 }
 
+impl Inverse {
+    /// Of a matrix as [`FreeBody::inertia`](super::rows::FreeBody), which is positive definite.
+    pub fn of(matrix: &Matrix6<f64>) -> Self {
+        let inertia = matrix.fixed_view::<3, 3>(3, 3).into_owned();
+        let inertia = inertia.cholesky().map_or_else(Matrix3::zeros, |inertia| inertia.inverse());
+        Self { mass: 1.0 / matrix[(0, 0)], inertia }
+    }
+
+    /// The velocity that a momentum gives.
+    #[inline]
+    pub fn times(&self, momentum: &Vector6<f64>) -> Vector6<f64> {
+        let [a, b, c, d, e, f] = momentum.data.0[0];
+        let turned = self.inertia * Vector3::new(d, e, f);
+        Vector6::new(self.mass * a, self.mass * b, self.mass * c, turned.x, turned.y, turned.z)
+    }
+}
+
 impl Bodies {
     /// `1 / (h √w)`
     fn scale(&self, weight: f64) -> f64 {
@@ -121,7 +146,7 @@ impl Bodies {
 
     /// `w`
     fn weight(&self, sides: &[Option<(usize, Vector6<f64>)>; 2]) -> f64 {
-        sides.iter().flatten().map(|(body, j)| j.dot(&(self.inverse[*body] * j))).sum()
+        sides.iter().flatten().map(|(body, j)| dot6(j, &self.inverse[*body].times(j))).sum()
     }
 }
 
@@ -129,7 +154,7 @@ impl Placed<'_> {
     /// The gap at the end of the step at these velocities, m or rad.
     pub fn at(&self, velocity: &[Vector6<f64>], time_step: f64) -> f64 {
         let rate = |(side, body): (&Option<(usize, Vector6<f64>)>, &Option<usize>)| match (side, body) {
-            (Some((_, j)), Some(body)) => j.dot(&velocity[*body]),
+            (Some((_, j)), Some(body)) => dot6(j, &velocity[*body]),
             _ => 0.0,
         };
         self.gap + time_step * self.row.sides.iter().zip(&self.bodies).map(rate).sum::<f64>()
@@ -336,6 +361,13 @@ impl Bundle {
         };
         RowForce { along: forces.push.0[lane] * self.scale.0[lane], friction }
     }
+}
+
+/// The scalar product. nalgebra's is a loop.
+#[inline]
+fn dot6(a: &Vector6<f64>, b: &Vector6<f64>) -> f64 {
+    let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (a.data.0[0], b.data.0[0]);
+    (a * u + b * v + c * w) + (d * x + e * y + f * z)
 }
 
 /// `J v`

@@ -3,7 +3,7 @@ use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
 use super::interior::{Interior, Solution};
-use super::line::{Bodies, Lines, Placed};
+use super::line::{Bodies, Inverse, Lines, Placed};
 use super::linear::Pattern;
 use super::rows::{Resistance, RowForce, RowId};
 
@@ -52,13 +52,11 @@ impl<'a> Problem<'a> {
         rows: Vec<Placed<'a>>,
         time_step: f64,
     ) -> Self {
-        // Inertias are positive definite.
-        let invert = |m: &Matrix6<f64>| m.cholesky().map_or_else(Matrix6::zeros, |m| m.inverse());
-        let inverse: Vec<_> = inertia.iter().map(invert).collect();
+        let inverse: Vec<_> = inertia.iter().map(Inverse::of).collect();
         for placed in rows.iter().filter(|row| is_given(row)) {
             for (side, body) in placed.row.sides.iter().zip(placed.bodies) {
                 if let (Some((_, j)), Some(body)) = (side, body) {
-                    target[body] += inverse[body] * j * (time_step * placed.row.bounds[0]);
+                    target[body] += inverse[body].times(j) * (time_step * placed.row.bounds[0]);
                 }
             }
         }
