@@ -1,5 +1,6 @@
 use std::time::Duration;
 
+use serde::Serialize;
 use tesdf::collide::{CollideError, Contact, HiddenOverlap};
 
 use crate::{Motor, State, System, Wrench};
@@ -62,6 +63,8 @@ pub struct StepReport {
     pub iterations: u32,
     /// Whether every solve reached its tolerance, and no pair is [`unbounded`](Self::unbounded).
     pub converged: bool,
+    /// What solves left that did not; zero where all did.
+    pub residual: Residual,
     /// Number of parts into which the step was divided, because a body turns far in it, joints
     /// would not hold, or where a fast pair would have passed.
     pub parts: u32,
@@ -80,6 +83,23 @@ pub struct StepReport {
     pub solution: Duration,
 }
 
+/// How far motion and forces are from those that the laws of contact, of joints and of momentum ask
+/// for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Residual {
+    /// The greatest way of a contact, a joint or a point of a body in the step, m.
+    pub way: f64,
+    /// The greatest force on a body, N.
+    pub force: f64,
+}
+
+impl Residual {
+    /// The greater ones.
+    pub(crate) fn max(self, other: Self) -> Self {
+        Self { way: self.way.max(other.way), force: self.force.max(other.force) }
+    }
+}
+
 impl StepReport {
     /// Adds what a later part of the same step did.
     pub(crate) fn add(&mut self, later: &Self) {
@@ -91,6 +111,7 @@ impl StepReport {
         self.islands = self.islands.max(later.islands);
         self.iterations += later.iterations;
         self.converged &= later.converged;
+        self.residual = self.residual.max(later.residual);
         self.detection += later.detection;
         self.solution += later.solution;
     }

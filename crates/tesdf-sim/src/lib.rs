@@ -37,7 +37,7 @@ mod simulate;
 mod system;
 mod warning;
 
-pub use dynamics::{Dynamics, DynamicsError, StepReport};
+pub use dynamics::{Dynamics, DynamicsError, Residual, StepReport};
 pub use joint::{Drive, Joint, JointKind, Motor};
 pub use mass::{MassError, MassProperties};
 pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};

@@ -11,7 +11,7 @@ use crate::criterion::{
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
 use crate::warning::{Warning, Watch, energies};
-use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
+use crate::{Dynamics, DynamicsError, HiddenPair, Residual, RunRecord, StepReport, System};
 
 /// The state of a run after a step.
 #[derive(Clone, Copy, Debug)]
@@ -334,6 +334,8 @@ pub(crate) struct Totals {
     pub(crate) unconverged: u64,
     /// The first step that did not converge.
     pub(crate) first_unconverged: Option<u64>,
+    /// The greatest of these steps.
+    pub(crate) residual: Residual,
     detection: Duration,
     solution: Duration,
 }
@@ -349,6 +351,7 @@ impl Totals {
         self.deepest = self.deepest.max(-report.deepest.unwrap_or(0.0));
         self.iterations += u64::from(report.iterations);
         self.unconverged += u64::from(!report.converged);
+        self.residual = self.residual.max(report.residual);
         self.detection += report.detection;
         self.solution += report.solution;
     }

@@ -6,7 +6,7 @@ use tesdf::collide::{ClearanceOptions, CollideError, InstancePair, clearance, in
 use crate::criterion::JointDrift;
 use crate::scene_file::{DetectorMode, SceneFile};
 use crate::simulate::Totals;
-use crate::{HiddenPair, Joint, Mass, System};
+use crate::{HiddenPair, Joint, Mass, Residual, System};
 
 /// Joints that come farther apart than this fraction of the diagonal of their child are told.
 const APART: f64 = 1e-3;
@@ -271,11 +271,12 @@ fn of_hidden(pair: &HiddenPair) -> Warning {
 }
 
 fn not_converged(totals: &Totals, time_step: f64) -> Option<Warning> {
-    let Totals { steps, unconverged, first_unconverged, .. } = *totals;
+    let Totals { steps, unconverged, first_unconverged, residual: Residual { way, force }, .. } = *totals;
     let first = first_unconverged? as f64 * time_step;
     let message = format!(
-        "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: forces there are not exact; shorten the \
-         time step"
+        "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: contacts and joints are off by {:.3e} µm \
+         and {force:.3e} N at most; shorten the time step",
+        1e6 * way
     );
     let value = unconverged as f64 / steps as f64;
     Some(Warning { kind: WarningKind::NotConverged, names: Vec::new(), value, count: unconverged, message })

@@ -24,7 +24,7 @@ use super::problem::{Minimum, Problem};
 use super::rotation::Rotation;
 use super::rows::{FreeBody, Resistance, Row, RowForce, carry};
 use super::step::Step;
-use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
+use crate::{Dynamics, DynamicsError, Mass, Motor, Residual, State, StepReport, System, Wrench};
 
 /// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
 /// signature implement this trait.
@@ -277,6 +277,7 @@ impl Newton {
             island.rows.iter().zip(minimum.forces).for_each(|(&k, force)| forces[k] = force);
             slowest = slowest.max(minimum.iterations);
             report.converged &= minimum.converged;
+            report.residual = report.residual.max(minimum.residual);
         }
         report.iterations += slowest;
         (velocities, forces)
@@ -490,7 +491,7 @@ impl Newton {
                 break;
             }
             // What an earlier minimisation did not reach is of no account.
-            step.report.converged = true;
+            (step.report.converged, step.report.residual) = (true, Residual::default());
             [velocities, carried] = self.velocities(&mut step, look.contacts.as_slice())?;
         }
         let mut states = self.moved(&step, &velocities);
@@ -517,7 +518,10 @@ impl Newton {
             let half = is_loose.then_some(Passing { hit: None, pairs: 0 });
             let divides = passing.filter(|_| may_divide).or(half);
             // A part that is divided is solved again.
-            report.add(&StepReport { converged: of_part.converged || divides.is_some(), ..of_part });
+            report.add(&match divides {
+                Some(_) => StepReport { converged: true, residual: Residual::default(), ..of_part },
+                None => of_part,
+            });
             first.get_or_insert_with(|| {
                 (report.contacts, report.deepest) = (of_part.contacts, of_part.deepest);
                 found

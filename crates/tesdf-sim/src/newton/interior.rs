@@ -29,6 +29,7 @@ use nalgebra::Vector6;
 use super::lanes::Lanes;
 use super::line::{Bodies, Bundle, Forces, Lines, Slips};
 use super::linear::Pattern;
+use crate::Residual;
 
 /// Bodies and the rows between them.
 pub struct Interior<'a> {
@@ -46,6 +47,8 @@ pub struct Solution {
     /// Number of factorisations.
     pub iterations: u32,
     pub converged: bool,
+    /// What it leaves, where it has not converged.
+    pub residual: Residual,
     /// The fixed limits of friction; empty where they follow from the pushes.
     limits: Vec<Lanes>,
 }
@@ -120,10 +123,19 @@ impl Interior<'_> {
         if self.greatest_violation() == 0.0 {
             let (velocity, forces) =
                 (self.bodies.target.to_vec(), vec![Forces::default(); self.lines.bundles.len()]);
-            return Solution { velocity, forces, iterations: 0, converged: true, limits: Vec::new() };
+            let (residual, limits) = (Residual::default(), Vec::new());
+            return Solution { velocity, forces, iterations: 0, converged: true, residual, limits };
         }
+        let mut found = self.iterate(guess);
+        if !found.converged {
+            found.residual = self.residual(&found.velocity, &found.forces);
+        }
+        found
+    }
+
+    fn iterate(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Forces>)>) -> Solution {
         let mut iterations = 0;
-        if let Some((velocity, forces)) = guess.filter(|(v, forces)| self.misfit(v, forces) < NEARLY) {
+        if let Some((velocity, forces)) = guess.filter(|(v, forces)| self.residual(v, forces).way < NEARLY) {
             let centre = self.centre_of(&velocity, &forces);
             let found = Iterate::from(self, velocity, &forces, centre).descend(Limits::Coulomb, WARM);
             iterations += found.iterations;
@@ -250,8 +262,8 @@ impl Interior<'_> {
         self.lines.bundles.iter().map(of_bundle).sum()
     }
 
-    /// How far velocities and forces are from a solution without friction's law, m.
-    fn misfit(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> f64 {
+    /// How far velocities and forces are from a solution without friction's law.
+    fn residual(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> Residual {
         let mut momentum = self.lack(velocity);
         let mut worst = 0.0;
         for batch in &self.lines.batches {
@@ -270,7 +282,11 @@ impl Interior<'_> {
             }
             group.act(acting.map(Lanes::sum), &mut momentum);
         }
-        greater(self.way_of_momentum(&momentum), worst)
+        let force = |p: &Vector6<f64>| p.fixed_rows::<3>(0).norm() / self.bodies.time_step;
+        Residual {
+            way: greater(self.way_of_momentum(&momentum), worst),
+            force: momentum.iter().map(force).fold(0.0, greater),
+        }
     }
 
     /// ν for velocities and forces that are nearly right.

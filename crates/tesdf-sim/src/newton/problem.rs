@@ -6,6 +6,7 @@ use super::interior::{Interior, Solution};
 use super::line::{Bodies, Inverse, Lines, Placed};
 use super::linear::Pattern;
 use super::rows::{Resistance, RowForce, RowId};
+use crate::Residual;
 
 /// Bodies, the rows between them, and the velocities without rows.
 #[derive(Debug)]
@@ -24,8 +25,10 @@ pub struct Minimum {
     pub forces: Vec<RowForce>,
     /// Number of Newton iterations.
     pub iterations: u32,
-    /// Whether the method came to its end.
+    /// Whether the method came to its end, ...
     pub converged: bool,
+    /// ... and what it left, where it did not.
+    pub residual: Residual,
 }
 
 /// A contact may act when its gap is at most this share of the way by which it differs between the
@@ -126,8 +129,8 @@ impl<'a> Problem<'a> {
                 for (force, placed) in forces.iter_mut().zip(&self.rows).filter(|(_, row)| is_given(row)) {
                     *force = RowForce { along: placed.row.bounds[0], friction: DVec3::ZERO };
                 }
-                let Solution { velocity, converged, .. } = found;
-                return Minimum { velocity, forces, iterations, converged };
+                let Solution { velocity, converged, residual, .. } = found;
+                return Minimum { velocity, forces, iterations, converged, residual };
             }
             added.iter().for_each(|&k| acts[k] = true);
             guess = (closed < NEARLY_OPEN && found.converged).then_some(found.velocity);

@@ -29,11 +29,11 @@ use tesdf::save::{Destination, GrowingFile, SaveError};
 
 use super::{About, RecordError, RunRecord};
 use crate::simulate::{PartialRun, Totals};
-use crate::{RunOrigin, StepReport};
+use crate::{Residual, RunOrigin, StepReport};
 
 const MAGIC: &[u8; 8] = b"tesdfrun";
 /// The journal version that this build writes and reads.
-const JOURNAL_VERSION: u32 = 1;
+const JOURNAL_VERSION: u32 = 2;
 const HEAD: usize = MAGIC.len() + size_of::<u32>();
 const CHECKSUM: usize = 16;
 /// In place of a number of contacts: the contacts are not recorded.
@@ -86,9 +86,11 @@ struct StateHead {
     hidden: u64,
     iterations: u32,
     converged: u32,
+    /// [`Residual`]: m, N.
+    residual: [f64; 2],
 }
 
-const _: () = assert!(size_of::<StateHead>() == 64);
+const _: () = assert!(size_of::<StateHead>() == 80);
 
 /// Whether `bytes` begin like a journal.
 pub(super) fn is_journal(bytes: &[u8]) -> bool {
@@ -249,6 +251,7 @@ fn state(record: &RunRecord, step: usize, report: &StepReport) -> Vec<u8> {
         hidden: hidden.len() as u64,
         iterations: report.iterations,
         converged: report.converged.into(),
+        residual: [report.residual.way, report.residual.force],
     };
     let bodies = record.bodies.len();
     let (of_bodies, kept) = (step * bodies..(step + 1) * bodies, kept.unwrap_or_default());
@@ -299,6 +302,7 @@ fn read_state(mut payload: &[u8], run: &mut PartialRun) -> Option<()> {
             deepest: Some(head.deepest).filter(|deepest| !deepest.is_nan()),
             iterations: head.iterations,
             converged: head.converged != 0,
+            residual: Residual { way: head.residual[0], force: head.residual[1] },
             detection: std::time::Duration::from_nanos(head.detection),
             solution: std::time::Duration::from_nanos(head.solution),
             ..StepReport::default()

@@ -4,6 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 use super::{Effort, Interior, Limits, Solution, WIDTHS};
 use crate::newton::lanes::{Lanes, WIDTH};
 use crate::newton::line::{Bundle, Forces, dot};
+use crate::Residual;
 use crate::newton::linear::{BlockMatrix, Factor};
 
 /// Lagged limits stay once the root of ν is below this gap, m.
@@ -503,7 +504,14 @@ impl<'a> Iterate<'a> {
     fn solution(&self, limits: &Limits, converged: bool) -> Solution {
         let limits = if let Limits::Fixed(limits) = limits { limits.clone() } else { Vec::new() };
         let (velocity, forces) = (self.velocity.clone(), self.forces());
-        Solution { velocity, forces, iterations: self.iterations, converged, limits }
+        Solution {
+            velocity,
+            forces,
+            iterations: self.iterations,
+            converged,
+            residual: Residual::default(),
+            limits,
+        }
     }
 }
 
