@@ -2,9 +2,9 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::{Effort, Interior, Limits, Solution, WIDTHS};
+use crate::Residual;
 use crate::newton::lanes::{Lanes, WIDTH};
 use crate::newton::line::{Bundle, Forces, dot};
-use crate::Residual;
 use crate::newton::linear::{BlockMatrix, Factor};
 
 /// Lagged limits stay once the root of ν is below this gap, m.
@@ -255,6 +255,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// The mean of room × slack.
+    #[inline(always)]
     fn product(&self) -> f64 {
         let products = self.states.iter().map(State::products);
         let sum = products.fold(Lanes::ZERO, |sum, [a, b]| sum + (a + b));
@@ -268,6 +269,7 @@ impl<'a> Iterate<'a> {
 
     /// Finds what an iteration has to know. Returns the matrix, the momentum that velocities and
     /// forces leave, and that which the predictor has to bring.
+    #[inline(always)]
     fn linearise(
         &mut self,
         limits: &Limits,
@@ -316,6 +318,7 @@ impl<'a> Iterate<'a> {
 
     /// The change of all unknowns to the aims, for the present `momentum`, where ν of friction is
     /// to become `centre`.
+    #[inline(always)]
     fn direction(
         &mut self,
         factor: &Factor<'_>,
@@ -340,6 +343,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// The change of all unknowns with the momentum `brought`.
+    #[inline(always)]
     fn follow(&self, factor: &Factor<'_>, brought: &[Vector6<f64>], is_coulomb: bool, to: &mut Direction) {
         let lines = self.of.lines;
         to.velocity = factor.solve(brought);
@@ -385,6 +389,7 @@ impl<'a> Iterate<'a> {
 
     /// The direction of an iteration, how far to go along it, and ν of friction at its end. The
     /// three `directions` are memory.
+    #[inline(always)]
     fn next(
         &mut self,
         factor: &Factor<'_>,
@@ -431,6 +436,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// Goes along a direction.
+    #[inline(always)]
     fn advance(&mut self, direction: &Direction, step: f64, limits: &Limits) {
         self.velocity.iter_mut().zip(&direction.velocity).for_each(|(v, change)| *v += step * change);
         for (k, ((state, change), bundle)) in
@@ -452,6 +458,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// The greatest gap and force that do not fit, m.
+    #[inline(always)]
     fn open(&self) -> f64 {
         let of_bundle = |(local, bundle): (&Local, &Bundle)| local.residual.map(f64::abs) / bundle.scale;
         let greatest = self.locals.iter().zip(&self.of.lines.bundles).map(of_bundle);
@@ -459,7 +466,25 @@ impl<'a> Iterate<'a> {
     }
 
     /// Iterates to the end.
-    pub fn descend(mut self, mut limits: Limits, effort: Effort) -> Solution {
+    pub fn descend(self, limits: Limits, effort: Effort) -> Solution {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.descend_with_avx2(limits, effort) };
+        }
+        self.descend_with_baseline(limits, effort)
+    }
+
+    /// The same code, and so the same bits, compiled for vectors of twice the width: an iteration
+    /// takes two thirds of the time.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn descend_with_avx2(self, limits: Limits, effort: Effort) -> Solution {
+        self.descend_with_baseline(limits, effort)
+    }
+
+    #[inline(always)]
+    fn descend_with_baseline(mut self, mut limits: Limits, effort: Effort) -> Solution {
         let has_friction = self.of.has_friction();
         let [freeze, few] = [self.of.mean_square(FREEZE), FEW * self.least];
         let balanced = BALANCED[0] + BALANCED[1] * self.of.way(&self.of.bodies.target);
@@ -623,6 +648,7 @@ impl Sum {
         }
     }
 
+    #[inline(always)]
     fn total(&self, is_symmetric: bool) -> Matrix6<f64> {
         let mut total = Matrix6::zeros();
         for (c, column) in self.0.iter().enumerate() {
