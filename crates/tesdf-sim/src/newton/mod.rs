@@ -43,6 +43,7 @@ mod passing;
 mod problem;
 mod rotation;
 mod rows;
+mod sleep;
 mod step;
 
 pub use engine::{Detect, Newton};
