@@ -60,8 +60,10 @@ struct Rest {
     time: f64,
 }
 
-#[derive(Debug, Default)]
+/// What was found between two bodies that are still.
+#[derive(Debug)]
 struct Kept {
+    bodies: [usize; 2],
     contacts: Vec<Contact>,
     hidden: Option<HiddenOverlap>,
 }
@@ -107,10 +109,8 @@ impl Sleep {
 
     /// The pairs of bodies that kept contacts or joints connect.
     fn links(&self, system: &System) -> Vec<[usize; 2]> {
-        let touching = self.pairs.iter().filter(|(_, kept)| !kept.contacts.is_empty());
-        let of_contacts =
-            touching.filter_map(|((_, a, b), _)| Some([system.body_of(*a)?, system.body_of(*b)?]));
-        of_contacts.chain(joined(system)).collect()
+        let touching = self.pairs.values().filter(|kept| !kept.contacts.is_empty());
+        touching.map(|kept| kept.bodies).chain(joined(system)).collect()
     }
 
     /// Wakes these bodies and all that are connected to them through bodies that are asleep.
@@ -138,23 +138,37 @@ impl Sleep {
 
     /// `found`, with what is kept of the pairs of bodies that are still, in the order of a detection.
     fn with_kept(&self, found: Contacts, system: &System) -> Contacts {
-        let are_still = |a: InstanceId, b: InstanceId| {
-            [a, b].iter().all(|id| system.body_of(*id).is_some_and(|body| self.still[body]))
-        };
-        let kept = || self.pairs.iter().filter(|((_, a, b), _)| are_still(*a, *b)).map(|(_, kept)| kept);
-        if kept().next().is_none() {
+        let are_still = |bodies: [usize; 2]| bodies.iter().all(|&body| self.still[body]);
+        let mut kept = self.pairs.iter().filter(|(_, kept)| are_still(kept.bodies)).peekable();
+        if kept.peek().is_none() {
             return found;
         }
-        let (statistics, mut hidden) = (found.statistics, found.hidden.clone());
-        let reductions = found.reductions.clone();
-        let mut contacts = found.into_vec();
+        let (statistics, reductions, mut hidden) =
+            (found.statistics, found.reductions.clone(), found.hidden.clone());
+        let key = |a: InstanceId, b: InstanceId| Self::key(system, a, b);
         // A detector may ignore the marks of the scene.
-        contacts.retain(|c| !are_still(c.instance_a, c.instance_b));
-        hidden.retain(|h| !are_still(h.instance_a, h.instance_b));
-        contacts.extend(kept().flat_map(|kept| &kept.contacts));
-        hidden.extend(kept().filter_map(|kept| kept.hidden));
-        contacts.sort_by_cached_key(|c| Self::key(system, c.instance_a, c.instance_b));
-        hidden.sort_by_key(|h| Self::key(system, h.instance_a, h.instance_b));
+        let is_kept = |a: InstanceId, b: InstanceId| {
+            let bodies = [system.body_of(a), system.body_of(b)];
+            matches!(bodies, [Some(a), Some(b)] if are_still([a, b]))
+        };
+        hidden.retain(|h| !is_kept(h.instance_a, h.instance_b));
+        let mut contacts = Vec::new();
+        let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
+        for of_pair in found.as_slice().chunk_by(|x, y| ids(x) == ids(y)) {
+            let (a, b) = ids(&of_pair[0]);
+            while let Some((_, kept)) = kept.next_if(|(of_kept, _)| **of_kept < key(a, b)) {
+                contacts.extend_from_slice(&kept.contacts);
+                hidden.extend(kept.hidden);
+            }
+            if !is_kept(a, b) {
+                contacts.extend_from_slice(of_pair);
+            }
+        }
+        for (_, kept) in kept {
+            contacts.extend_from_slice(&kept.contacts);
+            hidden.extend(kept.hidden);
+        }
+        hidden.sort_by_key(|h| key(h.instance_a, h.instance_b));
         Contacts::new(contacts, statistics, reductions, hidden)
     }
 }
@@ -185,8 +199,7 @@ impl Newton {
             asleep.wake(pulled, system);
         }
         let (still, kept) = (asleep.still.clone(), asleep.kept.clone());
-        let stays = |id: &InstanceId| system.body_of(*id).is_some_and(|body| still[body] && kept[body]);
-        asleep.pairs.retain(|(_, a, b), _| stays(a) && stays(b));
+        asleep.pairs.retain(|_, pair| pair.bodies.iter().all(|&body| still[body] && kept[body]));
         let new: Vec<bool> = still.iter().zip(&kept).map(|(still, kept)| *still && !kept).collect();
         if new.contains(&true) {
             let start = Instant::now();
@@ -217,18 +230,18 @@ impl Newton {
     /// Keeps what was found between bodies that are still, of which one is `new`.
     fn keep(&mut self, found: &Contacts, new: &[bool]) {
         let Self { system, sleep, .. } = self;
-        let is_kept = |a: InstanceId, b: InstanceId| {
-            let (Some(a), Some(b)) = (system.body_of(a), system.body_of(b)) else { return false };
-            sleep.still[a] && sleep.still[b] && (new[a] || new[b])
+        let Sleep { still, pairs, .. } = sleep;
+        let mut keep = |a: InstanceId, b: InstanceId, contact: Option<Contact>, hidden| {
+            let (Some(x), Some(y)) = (system.body_of(a), system.body_of(b)) else { return };
+            if still[x] && still[y] && (new[x] || new[y]) {
+                let none = || Kept { bodies: [x, y], contacts: Vec::new(), hidden: None };
+                let kept = pairs.entry(Sleep::key(system, a, b)).or_insert_with(none);
+                kept.contacts.extend(contact);
+                kept.hidden = kept.hidden.or(hidden);
+            }
         };
-        for contact in found.iter().filter(|c| is_kept(c.instance_a, c.instance_b)) {
-            let key = Sleep::key(system, contact.instance_a, contact.instance_b);
-            sleep.pairs.entry(key).or_default().contacts.push(*contact);
-        }
-        for hidden in found.hidden.iter().filter(|h| is_kept(h.instance_a, h.instance_b)) {
-            let key = Sleep::key(system, hidden.instance_a, hidden.instance_b);
-            sleep.pairs.entry(key).or_default().hidden = Some(*hidden);
-        }
+        found.iter().for_each(|c| keep(c.instance_a, c.instance_b, Some(*c), None));
+        found.hidden.iter().for_each(|h| keep(h.instance_a, h.instance_b, None, Some(*h)));
     }
 
     /// Marks bodies as still in the scene.
