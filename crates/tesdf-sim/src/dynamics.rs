@@ -30,6 +30,18 @@ pub trait Dynamics {
     /// [`DynamicsError::NoBody`], or [`DynamicsError::NotFinite`].
     fn set_wrench(&mut self, body: usize, wrench: Wrench) -> Result<(), DynamicsError>;
 
+    /// Takes over the states after a step of `time_step` seconds that was made before, without making
+    /// it. An engine that remembers more than the states of its bodies follows a run that it continues
+    /// this way: first the states at the beginning, without a time step, then those after each step,
+    /// with what was set before it. Returns false, and does nothing, when its steps depend on states
+    /// alone.
+    ///
+    /// # Errors
+    /// As [`System::set_states`].
+    fn recall(&mut self, _states: Vec<State>, _time_step: Option<f64>) -> Result<bool, DynamicsError> {
+        Ok(false)
+    }
+
     /// Advances all bodies by `time_step` seconds.
     ///
     /// # Errors
@@ -59,6 +71,9 @@ pub struct StepReport {
     pub advances: u32,
     /// Number of islands in the last solve: groups of bodies that are solved independently.
     pub islands: usize,
+    /// Number of free bodies that are asleep at the end of the step: nothing is solved for them until
+    /// something touches or drives them.
+    pub asleep: usize,
     /// Iterations of the slowest island, summed over all solves of the step.
     pub iterations: u32,
     /// Whether every solve reached its tolerance, and no pair is [`unbounded`](Self::unbounded).

@@ -68,6 +68,9 @@ pub enum Interpolation {
     Step,
 }
 
+/// A way that is no more than rounding, as part of the distance from the origin, and an angle, rad.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// The scripts of a scene, whose bodies and joints are found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scripts(Vec<Track>);
@@ -113,8 +116,13 @@ impl Scripts {
                 Values::Poses { body, poses } => {
                     let target = track.at(time + h, poses, between).pose;
                     let state = engine.system().states()[*body];
-                    let linear = (target.translation - state.pose.translation) / h;
-                    let angular = rotation_between(state.pose, target) / h;
+                    let way = target.translation - state.pose.translation;
+                    let turn = rotation_between(state.pose, target);
+                    // What rounding has left of the way is no motion: the body rests.
+                    let rounding = ROUNDING * target.translation.abs().max_element();
+                    let rests = way.abs().max_element() <= rounding && turn.length() <= ROUNDING;
+                    let [linear, angular] =
+                        if rests { [DVec3::ZERO; 2] } else { [way, turn].map(|way| way / h) };
                     engine.set_state(*body, State { linear, angular, ..state })?;
                 }
                 Values::Wrenches { body, wrenches } => {

@@ -58,6 +58,8 @@ pub struct Summary {
     pub mean_iterations: f64,
     /// Number of steps whose solution did not reach the tolerance.
     pub unconverged_steps: u64,
+    /// Number of bodies that are asleep at the end.
+    pub asleep: usize,
     /// Mean wall time of the detection per step, ms.
     pub detection_ms: f64,
     /// Mean wall time of the rest of a step, ms.
@@ -161,8 +163,8 @@ pub fn simulate(
 }
 
 /// As [`simulate`], but continues from the last step of `run`; `engine` must have the states of
-/// that step. A step depends on the states of the bodies and the time alone, so the record equals
-/// that of an uninterrupted run, bit for bit.
+/// that step, and nothing else behind it. It [recalls](Dynamics::recall) the steps of `run`, so the
+/// record equals that of an uninterrupted run, bit for bit.
 ///
 /// # Errors
 /// The same errors as [`simulate`].
@@ -173,6 +175,7 @@ pub fn simulate_from(
     mut watch: impl FnMut(&Moment<'_>) -> ControlFlow<()>,
 ) -> Result<(RunRecord, Summary), SimulateError> {
     let mut run = Run::new(scene, engine.system(), run)?;
+    run.recall(engine)?;
     while !run.is_complete() {
         let moment = run.step(engine)?;
         if watch(&moment).is_break() {
@@ -240,6 +243,22 @@ impl Run {
             steps,
             contacts_every,
         })
+    }
+
+    /// Lets `engine` recall the steps so far.
+    fn recall(&self, engine: &mut dyn Dynamics) -> Result<(), SimulateError> {
+        let (steps, h) = (self.record.steps(), self.time_step);
+        for step in 0..=steps {
+            let failed = |source| SimulateError::Step { step, source };
+            if let Some(before) = step.checked_sub(1) {
+                self.scripts.drive(engine, before as f64 * h, h).map_err(failed)?;
+            }
+            let states = self.record.states(step as usize).unwrap_or_default();
+            if steps == 0 || !engine.recall(states, (step > 0).then_some(h)).map_err(failed)? {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Makes one step with `engine`. The scene's duration does not limit the number of steps.
@@ -332,6 +351,8 @@ pub(crate) struct Totals {
     deepest: f64,
     iterations: u64,
     pub(crate) unconverged: u64,
+    /// Bodies that were asleep after the last step.
+    asleep: usize,
     /// The first step that did not converge.
     pub(crate) first_unconverged: Option<u64>,
     /// The greatest of these steps.
@@ -352,6 +373,7 @@ impl Totals {
         self.iterations += u64::from(report.iterations);
         self.unconverged += u64::from(!report.converged);
         self.residual = self.residual.max(report.residual);
+        self.asleep = report.asleep;
         self.detection += report.detection;
         self.solution += report.solution;
     }
@@ -366,6 +388,7 @@ impl Totals {
             deepest_penetration: self.deepest,
             mean_iterations: self.iterations as f64 / n,
             unconverged_steps: self.unconverged,
+            asleep: self.asleep,
             detection_ms: ms(self.detection),
             solution_ms: ms(self.solution),
             ..Summary::default()

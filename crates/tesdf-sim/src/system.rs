@@ -348,6 +348,11 @@ impl System {
         Ok(&self.scene)
     }
 
+    /// Marks instances of the scene as still, and no others.
+    pub(crate) fn set_still(&mut self, ids: impl IntoIterator<Item = InstanceId>) {
+        self.scene.set_still(ids);
+    }
+
     /// Kinetic energy of all free bodies, J.
     pub fn kinetic_energy(&self) -> f64 {
         self.free().map(|(mass, state)| mass.kinetic_energy(state)).sum()

@@ -23,6 +23,7 @@ use super::passing::Passing;
 use super::problem::{Minimum, Problem};
 use super::rotation::Rotation;
 use super::rows::{FreeBody, Resistance, Row, RowForce, carry};
+use super::sleep::Sleep;
 use super::step::Step;
 use crate::{Dynamics, DynamicsError, Mass, Motor, Residual, State, StepReport, System, Wrench};
 
@@ -65,6 +66,7 @@ pub struct Newton {
     surfaces: Surfaces,
     /// What the last step found at its beginning.
     found: Contacts,
+    pub(super) sleep: Sleep,
 }
 
 /// The velocities of the free bodies that move the poses, and those that the next step starts from.
@@ -141,7 +143,21 @@ impl Newton {
         let sizes = diagonals.collect::<Result<_, CollideError>>()?;
         let (detector, found) = (Box::new(detector), Contacts::default());
         let surfaces = Surfaces::new(system.scene(), collide.mode);
-        Ok(Self { system, detector, collide, options, sizes, surfaces, found })
+        let sleep = Sleep::new(system.states());
+        Ok(Self { system, detector, collide, options, sizes, surfaces, found, sleep })
+    }
+
+    /// Sets gravity, m/s², from now on. All bodies wake.
+    ///
+    /// # Errors
+    /// [`DynamicsError::Option`] when a component is not finite.
+    pub fn set_gravity(&mut self, gravity: DVec3) -> Result<(), DynamicsError> {
+        if let Some(found) = gravity.to_array().into_iter().find(|c| !c.is_finite()) {
+            return Err(DynamicsError::Option { option: "gravity", found, expected: "finite numbers" });
+        }
+        self.system.gravity = gravity;
+        self.wake_all();
+        Ok(())
     }
 
     fn begin(&self, h: f64, whole: f64) -> Step {
@@ -149,7 +165,9 @@ impl Newton {
         let mut free_of = vec![None; states.len()];
         let (mut free, mut target, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
         for (k, (body, state)) in self.system.bodies().iter().zip(states).enumerate() {
-            if let Mass::Free(mass) = body.mass {
+            if let Mass::Free(mass) = body.mass
+                && !self.sleep.is_still(k)
+            {
                 free_of[k] = Some(free.len());
                 let (gravity, wrench) = (self.system.gravity, self.system.wrenches()[k]);
                 let outside = Outside { gravity, wrench, angular_damping: body.angular_damping };
@@ -171,7 +189,8 @@ impl Newton {
     pub(super) fn moved(&self, step: &Step, velocities: &[Vector6<f64>]) -> Vec<State> {
         let mut states = self.system.states().to_vec();
         for (body, state) in self.system.bodies().iter().zip(&mut states) {
-            if body.mass == Mass::Kinematic {
+            // Without a velocity the pose stays bit for bit.
+            if body.mass == Mass::Kinematic && *state != State::at_rest(state.pose) {
                 state.pose = moved(DVec3::ZERO, state.pose, &velocity(state), step.h);
             }
         }
@@ -187,7 +206,7 @@ impl Newton {
 
     /// The options of a detection. Within a step, gravity acts on one body of a pair while contacts
     /// hold the other, so it counts for all pairs.
-    fn options_of(&self, time_step: f64) -> CollideOptions {
+    pub(super) fn options_of(&self, time_step: f64) -> CollideOptions {
         let speculative_time = self.options.speculation * time_step;
         let fall = speculative_time * time_step * self.system.gravity.length();
         let contact_distance = self.collide.contact_distance + fall;
@@ -469,8 +488,9 @@ impl Newton {
         Ok((left / parts).max(whole / MOST_PARTS).min(left))
     }
 
-    /// Solves a part of a step, `whole`, that takes `time_step` seconds. Nothing moves yet.
-    fn part(&mut self, time_step: f64, whole: f64) -> Result<Part, DynamicsError> {
+    /// Solves a part of a step, `whole`, that takes `time_step` seconds. Nothing moves yet. Returns
+    /// `None` where bodies have woken, which is to be solved anew.
+    fn part(&mut self, time_step: f64, whole: f64) -> Result<Option<Part>, DynamicsError> {
         let begin = Instant::now();
         let mut step = self.begin(time_step, whole);
         // The detection must reach as far as the step can close, so it uses the velocities that
@@ -481,6 +501,9 @@ impl Newton {
         let target: Vec<_> = step.target.iter().map(|v| v - falling).collect();
         set_velocities(&mut ahead, &step.free, &target);
         let mut look = self.look(&mut step, &ahead)?;
+        if self.wakes(look.contacts.as_slice()) {
+            return Ok(None);
+        }
         let [mut velocities, mut carried] = self.velocities(&mut step, look.contacts.as_slice())?;
         for _ in 0..MORE_LOOKS {
             if !self.look_on(&step, &look, &mut ahead, &velocities)? {
@@ -489,6 +512,9 @@ impl Newton {
             let more = self.look(&mut step, &ahead)?;
             if !look.extend(more, self.system.scene()) {
                 break;
+            }
+            if self.wakes(look.contacts.as_slice()) {
+                return Ok(None);
             }
             // What an earlier minimisation did not reach is of no account.
             (step.report.converged, step.report.residual) = (true, Residual::default());
@@ -500,20 +526,25 @@ impl Newton {
         set_velocities(&mut states, &step.free, &carried);
         let mut report = step.report;
         let found = look.contacts;
-        report.contacts = found.len();
-        report.deepest = found.iter().map(|c| c.distance).reduce(f64::min);
         report.solution = begin.elapsed().saturating_sub(report.detection);
-        Ok(Part { states, found, passing, is_loose, report })
+        Ok(Some(Part { states, found, passing, is_loose, report }))
     }
 
     /// Moves by a step, in as many parts as bodies that turn far, fast pairs and joints need.
     fn in_parts(&mut self, whole: f64) -> Result<StepReport, DynamicsError> {
-        let mut report = StepReport { converged: true, ..StepReport::default() };
+        let mut report = self.begin_sleep(whole)?;
         let mut first: Option<Contacts> = None;
+        let mut touching = Vec::new();
         let (mut left, mut longest) = (whole, whole);
         let mut time = self.part_of(left, whole)?;
+        if self.is_all_still() {
+            (left, report.parts) = (0.0, 1);
+        }
         while left > 0.0 {
-            let Part { states, found, passing, is_loose, report: of_part } = self.part(time, whole)?;
+            let Some(Part { states, found, passing, is_loose, report: of_part }) = self.part(time, whole)?
+            else {
+                continue;
+            };
             let may_divide = report.divided < MOST_DIVISIONS;
             let half = is_loose.then_some(Passing { hit: None, pairs: 0 });
             let divides = passing.filter(|_| may_divide).or(half);
@@ -522,10 +553,8 @@ impl Newton {
                 Some(_) => StepReport { converged: true, residual: Residual::default(), ..of_part },
                 None => of_part,
             });
-            first.get_or_insert_with(|| {
-                (report.contacts, report.deepest) = (of_part.contacts, of_part.deepest);
-                found
-            });
+            touching = self.touching(found.as_slice());
+            first.get_or_insert_with(|| self.with_kept(found));
             if let Some(Passing { hit, .. }) = divides {
                 report.divided += 1;
                 time = hit.unwrap_or(0.5 * time);
@@ -542,7 +571,10 @@ impl Newton {
             longest *= 2.0;
             time = self.part_of(left, whole)?.min(longest);
         }
-        self.found = first.unwrap_or_default();
+        self.found = first.unwrap_or_else(|| self.with_kept(Contacts::default()));
+        report.contacts = self.found.len();
+        report.deepest = self.found.iter().map(|c| c.distance).reduce(f64::min);
+        report.asleep = self.end_sleep(whole, &touching)?;
         Ok(report)
     }
 
@@ -674,15 +706,19 @@ impl Dynamics for Newton {
     }
 
     fn set_state(&mut self, body: usize, state: State) -> Result<(), DynamicsError> {
-        self.system.set_state(body, state)
+        self.set_state_awake(body, state)
     }
 
     fn set_motor(&mut self, joint: usize, motor: Option<Motor>) -> Result<(), DynamicsError> {
-        self.system.set_motor(joint, motor)
+        self.set_motor_awake(joint, motor)
     }
 
     fn set_wrench(&mut self, body: usize, wrench: Wrench) -> Result<(), DynamicsError> {
-        self.system.set_wrench(body, wrench)
+        self.set_wrench_awake(body, wrench)
+    }
+
+    fn recall(&mut self, states: Vec<State>, time_step: Option<f64>) -> Result<bool, DynamicsError> {
+        self.recall_states(states, time_step)
     }
 
     fn step(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {
@@ -691,7 +727,9 @@ impl Dynamics for Newton {
             return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
         }
         let states = self.system.states().to_vec();
-        self.in_parts(time_step).or_else(|error| {
+        let made = self.in_parts(time_step);
+        self.unmark();
+        made.or_else(|error| {
             self.system.set_states(states)?;
             Err(error)
         })

@@ -44,7 +44,8 @@ pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
     islands
 }
 
-fn root(parent: &mut [usize], mut k: usize) -> usize {
+/// The lowest body of the group that `k` belongs to.
+pub fn root(parent: &mut [usize], mut k: usize) -> usize {
     while parent[k] != k {
         parent[k] = parent[parent[k]];
         k = parent[k];

@@ -45,6 +45,7 @@ mod problem;
 mod relative;
 mod rotation;
 mod rows;
+mod sleep;
 mod step;
 
 pub use engine::{Detect, Newton};

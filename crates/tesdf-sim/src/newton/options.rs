@@ -35,6 +35,9 @@ pub struct NewtonOptions {
     /// Contacts are detected as far ahead as the motion of this number of steps can close. With a
     /// fixed distance instead, a peg of 50 µm clearance tunnelled at steps of 5 ms.
     pub speculation: f64,
+    /// An island of bodies that have been at rest for this time, s, sleeps until something touches or
+    /// drives it. With 0 nothing ever sleeps.
+    pub sleep: f64,
 }
 
 impl Default for NewtonOptions {
@@ -48,6 +51,7 @@ impl Default for NewtonOptions {
             skin: 2e-6,
             deep: 3e-3,
             speculation: 1.2,
+            sleep: 0.5,
         }
     }
 }
@@ -64,6 +68,7 @@ impl NewtonOptions {
             ("skin", self.skin),
             ("deep", self.deep),
             ("speculation", self.speculation),
+            ("sleep", self.sleep),
         ] {
             not_negative(option, found)?;
         }

@@ -18,6 +18,7 @@ mod scene_file;
 mod screw;
 mod scripts;
 mod separation;
+mod sleep;
 mod support;
 mod transmission;
 mod warnings;

@@ -79,9 +79,13 @@ pub fn instance_pairs(
         for &i in &planes {
             bodies.iter().try_for_each(|&j| within(offer(i, j)))?;
         }
-        if bodies.len() <= FEW {
-            for (k, &i) in bodies.iter().enumerate() {
-                bodies[k + 1..].iter().try_for_each(|&j| within(offer(i, j)))?;
+        // Two still instances are no pair, so they are not offered where that saves the tree.
+        let moving: Vec<bool> = entries.iter().map(|(entry, _)| !scene.is_still(entry.id)).collect();
+        let few: Vec<usize> = bodies.iter().copied().filter(|&i| moving[i]).take(FEW + 1).collect();
+        if few.len() <= FEW {
+            for &i in &few {
+                let others = bodies.iter().filter(|&&j| j > i || !moving[j]);
+                others.into_iter().try_for_each(|&j| within(offer(i, j)))?;
             }
         } else {
             let boxes: Vec<Aabb> = bodies.iter().map(|&i| entries[i].0.bounds).collect();

@@ -42,6 +42,7 @@ pub struct InstancePairs {
     /// The numbers that all boxes depend on.
     measures: Measures,
     excluded: Vec<(InstanceId, InstanceId)>,
+    still: Vec<InstanceId>,
 }
 
 /// Contact distance, speculative time, and the bounds of all shapes.
@@ -159,6 +160,10 @@ impl InstancePairs {
         let excluded: Vec<_> = scene.excluded().collect();
         if excluded != self.excluded {
             self.excluded = excluded;
+            self.bodies.iter_mut().for_each(|body| body.has_changed = true);
+        }
+        if scene.still() != self.still {
+            self.still = scene.still().to_vec();
             self.bodies.iter_mut().for_each(|body| body.has_changed = true);
         }
         if self.bodies.iter().any(|body| body.has_left) {
@@ -281,7 +286,8 @@ impl InstancePairs {
             let [a, b] = [candidate.first, candidate.second].map(|i| &bodies[i as usize]);
             if a.has_changed || b.has_changed {
                 candidate.pair = Entry::pair(&a.entry, &b.entry, measures.contact_distance)
-                    .filter(|pair| !scene.is_excluded(pair.first, pair.second));
+                    .filter(|pair| !scene.is_excluded(pair.first, pair.second))
+                    .filter(|pair| !scene.are_still(pair.first, pair.second));
             }
             if let Some(pair) = candidate.pair {
                 pairs.push(pair);

@@ -88,6 +88,8 @@ pub struct Scene {
     ids: Vec<InstanceId>,
     instances: Vec<Instance>,
     excluded: BTreeSet<(InstanceId, InstanceId)>,
+    /// Sorted.
+    still: Vec<InstanceId>,
     next_shape: u32,
     next_instance: u32,
 }
@@ -210,6 +212,7 @@ impl Scene {
         self.instances.retain(|_| kept.next() == Some(true));
         self.ids.retain(|id| !gone.contains(id));
         self.excluded.retain(|(a, b)| !gone.contains(a) && !gone.contains(b));
+        self.still.retain(|id| !gone.contains(id));
         Ok(())
     }
 
@@ -258,6 +261,26 @@ impl Scene {
         self.excluded.remove(&(a.min(b), a.max(b)));
     }
 
+    /// Marks these instances, and no others, as still. Two still instances never meet: nothing is
+    /// detected between bodies that do not move, whose contacts the caller knows. The mark has no
+    /// effect on the detection of `tesdf-gpu`, nor on queries of a given pair.
+    pub fn set_still(&mut self, ids: impl IntoIterator<Item = InstanceId>) {
+        self.still.clear();
+        self.still.extend(ids);
+        self.still.sort_unstable();
+        self.still.dedup();
+    }
+
+    /// Whether an instance is marked as still.
+    pub fn is_still(&self, id: InstanceId) -> bool {
+        self.still.binary_search(&id).is_ok()
+    }
+
+    /// The instances that are marked as still, sorted.
+    pub fn still(&self) -> &[InstanceId] {
+        &self.still
+    }
+
     /// The state of an instance.
     ///
     /// # Errors
@@ -284,10 +307,19 @@ impl Scene {
         self.ids.iter().copied().zip(&self.instances)
     }
 
-    /// Whether two different instances may meet: they are in the same world, their groups meet, and
-    /// the pair is not excluded.
+    /// Whether two different instances may meet: they are in the same world, their groups meet, the
+    /// pair is not excluded, and they are not both still.
     pub fn may_meet(&self, a: (InstanceId, &Instance), b: (InstanceId, &Instance)) -> bool {
-        a.0 != b.0 && a.1.world == b.1.world && a.1.groups.meet(b.1.groups) && !self.is_excluded(a.0, b.0)
+        a.0 != b.0
+            && a.1.world == b.1.world
+            && a.1.groups.meet(b.1.groups)
+            && !self.is_excluded(a.0, b.0)
+            && !self.are_still(a.0, b.0)
+    }
+
+    /// Whether both instances of a pair are still.
+    pub(super) fn are_still(&self, a: InstanceId, b: InstanceId) -> bool {
+        self.is_still(a) && self.is_still(b)
     }
 
     /// Whether a pair of instances is excluded.

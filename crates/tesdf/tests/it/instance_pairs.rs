@@ -106,7 +106,7 @@ impl Changing {
     /// A change that is rare.
     fn change(&mut self) {
         let id = self.any();
-        match self.random.index(8) {
+        match self.random.index(9) {
             0 => self.update(id, |this, i| Instance { pose: this.instance().pose, ..i }),
             1 => self.update(id, |this, i| Instance { groups: this.instance().groups, ..i }),
             2 => self.update(id, |this, i| Instance { velocity: this.instance().velocity, ..i }),
@@ -114,6 +114,10 @@ impl Changing {
             4 => self.update(id, |this, _| this.instance()),
             5 => self.add(2),
             6 => self.scene.remove(&[id]).expect("it is there"),
+            7 => {
+                let still: Vec<_> = (0..30).map(|_| self.any()).collect();
+                self.scene.set_still(still);
+            }
             _ => {
                 let other = self.any();
                 match self.scene.is_excluded(id, other) {

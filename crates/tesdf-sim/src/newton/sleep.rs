@@ -1,0 +1,433 @@
+//! Sleep: bodies at rest are not solved, and nothing is detected between them.
+//!
+//! An island is free bodies that contacts or joints connect. It falls asleep at the end of a step when
+//! all of its bodies have stayed where they are for [`NewtonOptions::sleep`] seconds: its velocities
+//! become exactly zero, and its poses stay bit for bit. Bodies that are asleep are to the others what
+//! fixed bodies are.
+//!
+//! *Waking.* A step begins with a look. Where it finds a contact between a body that is asleep and one
+//! that is not, or that moves, the whole island wakes, and the step begins again before anything has
+//! moved. So a push passes through a stack in the step in which it hits. A body also wakes when its
+//! motor, its wrench or its state is set to another value, when gravity is, and with what a joint
+//! connects it to.
+//!
+//! *What is kept.* Contacts of bodies that are still (fixed, asleep, or kinematic and without velocity)
+//! are detected once, when one of the two has become still, and reported in every step. They also say
+//! which bodies wake together.
+//!
+//! *What it depends on.* The time at rest follows from the states after each step and from what was set
+//! between steps, the rest from that and the states of the step. So a run that is continued gives the
+//! same bytes after [`Dynamics::recall`](crate::Dynamics::recall).
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use tesdf::collide::{
+    CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, InstanceId, Pose, instance_pairs,
+};
+
+use super::islands::root;
+use super::{Newton, NewtonOptions};
+use crate::{DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
+
+/// A body is at rest as long as no point of it has left its place by more than this, m, or its velocity
+/// would take it that far in a step. The solver moves bodies at rest by 0.1 nm a step at most, and by
+/// a few pm in a second where there is no friction.
+const STAYS: f64 = 1e-9;
+
+/// The same as part of the body's diagonal, for bodies below a millimetre.
+const STAYS_OF_SIZE: f64 = 1e-6;
+
+/// What is known of bodies at rest, of each body by its number.
+#[derive(Debug, Default)]
+pub struct Sleep {
+    rests: Vec<Rest>,
+    /// Whether a pose was set since the last step.
+    displaced: Vec<bool>,
+    /// Whether a body is fixed, kinematic without velocity, or asleep in the current step.
+    still: Vec<bool>,
+    /// The bodies whose pairs are in `pairs`.
+    kept: Vec<bool>,
+    /// What was found between bodies that are still, by world and instances, the lower one first.
+    pairs: BTreeMap<(u32, InstanceId, InstanceId), Kept>,
+}
+
+/// How long a body has been at rest.
+#[derive(Clone, Copy, Debug)]
+struct Rest {
+    /// Where it came to rest.
+    place: Pose,
+    /// Since when, s; not counted beyond the time after which it may sleep.
+    time: f64,
+}
+
+/// What was found between two bodies that are still.
+#[derive(Debug)]
+struct Kept {
+    bodies: [usize; 2],
+    contacts: Vec<Contact>,
+    hidden: Option<HiddenOverlap>,
+}
+
+impl Sleep {
+    /// All bodies have just been let go.
+    pub fn new(states: &[State]) -> Self {
+        let rests = states.iter().map(|state| Rest { place: state.pose, time: 0.0 }).collect();
+        let none = || vec![false; states.len()];
+        Self { rests, displaced: none(), still: none(), kept: none(), pairs: BTreeMap::new() }
+    }
+
+    /// Whether a body does not move in this step, so that it is solved neither as free nor detected
+    /// against others of its kind.
+    pub fn is_still(&self, body: usize) -> bool {
+        self.still[body]
+    }
+
+    fn key(system: &System, a: InstanceId, b: InstanceId) -> (u32, InstanceId, InstanceId) {
+        (system.scene().instance(a).map_or(0, |instance| instance.world), a.min(b), a.max(b))
+    }
+
+    /// Counts how long bodies have been at rest after a step of `h` seconds.
+    fn count(&mut self, states: &[State], sizes: &[f64], h: f64, longest: f64) {
+        for ((rest, state), size) in self.rests.iter_mut().zip(states).zip(sizes) {
+            let stays = STAYS.min(STAYS_OF_SIZE * size);
+            let speed = state.linear.length() + size * state.angular.length();
+            match way(rest.place, state.pose, *size) <= stays && h * speed <= stays {
+                true => rest.time = (rest.time + h).min(longest),
+                false => *rest = Rest { place: state.pose, time: 0.0 },
+            }
+        }
+        self.displaced.fill(false);
+    }
+
+    /// Wakes the bodies that contacts or joints connect to `body`, and itself.
+    fn disturb(&mut self, body: usize, system: &System) {
+        let near = self.links(system).into_iter().filter(|pair| pair.contains(&body));
+        for body in near.flatten().chain([body]) {
+            self.rests[body].time = 0.0;
+        }
+    }
+
+    /// The pairs of bodies that kept contacts or joints connect.
+    fn links(&self, system: &System) -> Vec<[usize; 2]> {
+        let touching = self.pairs.values().filter(|kept| !kept.contacts.is_empty());
+        touching.map(|kept| kept.bodies).chain(joined(system)).collect()
+    }
+
+    /// Wakes these bodies and all that are connected to them through bodies that are asleep.
+    fn wake(&mut self, bodies: Vec<usize>, system: &System) {
+        let mut neighbours: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for [a, b] in self.links(system) {
+            neighbours.entry(a).or_default().push(b);
+            neighbours.entry(b).or_default().push(a);
+        }
+        let mut queue = bodies;
+        while let Some(body) = queue.pop() {
+            if is_free(system, body) && std::mem::take(&mut self.still[body]) {
+                self.kept[body] = false;
+                queue.extend(neighbours.get(&body).into_iter().flatten());
+            }
+        }
+    }
+
+    /// Of these pairs of bodies, those that are asleep beside a body that is not still.
+    fn touched(&self, pairs: impl Iterator<Item = [usize; 2]>, system: &System) -> Vec<usize> {
+        let asleep =
+            |a: usize, b: usize| (self.still[a] && !self.still[b] && is_free(system, a)).then_some(a);
+        pairs.filter_map(|[a, b]| asleep(a, b).or(asleep(b, a))).collect()
+    }
+
+    /// `found`, with what is kept of the pairs of bodies that are still, in the order of a detection.
+    fn with_kept(&self, found: Contacts, system: &System) -> Contacts {
+        let are_still = |bodies: [usize; 2]| bodies.iter().all(|&body| self.still[body]);
+        let mut kept = self.pairs.iter().filter(|(_, kept)| are_still(kept.bodies)).peekable();
+        if kept.peek().is_none() {
+            return found;
+        }
+        let (statistics, reductions, mut hidden) =
+            (found.statistics, found.reductions.clone(), found.hidden.clone());
+        let key = |a: InstanceId, b: InstanceId| Self::key(system, a, b);
+        // A detector may ignore the marks of the scene.
+        let is_kept = |a: InstanceId, b: InstanceId| {
+            let bodies = [system.body_of(a), system.body_of(b)];
+            matches!(bodies, [Some(a), Some(b)] if are_still([a, b]))
+        };
+        hidden.retain(|h| !is_kept(h.instance_a, h.instance_b));
+        let mut contacts = Vec::new();
+        let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
+        for of_pair in found.as_slice().chunk_by(|x, y| ids(x) == ids(y)) {
+            let (a, b) = ids(&of_pair[0]);
+            while let Some((_, kept)) = kept.next_if(|(of_kept, _)| **of_kept < key(a, b)) {
+                contacts.extend_from_slice(&kept.contacts);
+                hidden.extend(kept.hidden);
+            }
+            if !is_kept(a, b) {
+                contacts.extend_from_slice(of_pair);
+            }
+        }
+        for (_, kept) in kept {
+            contacts.extend_from_slice(&kept.contacts);
+            hidden.extend(kept.hidden);
+        }
+        hidden.sort_by_key(|h| key(h.instance_a, h.instance_b));
+        Contacts::new(contacts, statistics, reductions, hidden)
+    }
+}
+
+impl Newton {
+    fn sleeps(&self) -> bool {
+        self.options.sleep > 0.0
+    }
+
+    /// Before a step: which bodies are still in it, and their contacts with each other.
+    pub(super) fn begin_sleep(&mut self, whole: f64) -> Result<StepReport, DynamicsError> {
+        let mut report = StepReport { converged: true, ..StepReport::default() };
+        if !self.sleeps() {
+            return Ok(report);
+        }
+        let NewtonOptions { sleep: longest, .. } = self.options;
+        let (system, asleep) = (&self.system, &mut self.sleep);
+        for (k, (body, state)) in system.bodies().iter().zip(system.states()).enumerate() {
+            let has_velocity = !(state.linear.length() == 0.0 && state.angular.length() == 0.0);
+            asleep.still[k] = match body.mass {
+                Mass::Fixed => !asleep.displaced[k],
+                Mass::Kinematic => !asleep.displaced[k] && !has_velocity,
+                Mass::Free(_) => asleep.rests[k].time >= longest && !has_velocity,
+            };
+        }
+        let pulled = asleep.touched(joined(system), system);
+        if !pulled.is_empty() {
+            asleep.wake(pulled, system);
+        }
+        let (still, kept) = (asleep.still.clone(), asleep.kept.clone());
+        asleep.pairs.retain(|_, pair| pair.bodies.iter().all(|&body| still[body] && kept[body]));
+        let new: Vec<bool> = still.iter().zip(&kept).map(|(still, kept)| *still && !kept).collect();
+        if new.contains(&true) {
+            let start = Instant::now();
+            self.find_kept(&new, whole)?;
+            report.detection += start.elapsed();
+        }
+        self.sleep.kept.clone_from(&still);
+        self.mark(&still);
+        Ok(report)
+    }
+
+    /// Finds what is kept of the pairs of a body that is `new` among those that are still.
+    fn find_kept(&mut self, new: &[bool], whole: f64) -> Result<(), DynamicsError> {
+        // Only pairs with such a body are looked at.
+        self.mark(&new.iter().map(|new| !new).collect::<Vec<_>>());
+        let states = self.system.states().to_vec();
+        let options = CollideOptions { hidden: HiddenSearch::On, ..self.options_of(whole) };
+        let CollideOptions { contact_distance, speculative_time, .. } = options;
+        let pairs = instance_pairs(self.system.scene_at(&states)?, contact_distance, speculative_time)?;
+        let is_still = |id| self.system.body_of(id).is_some_and(|body| self.sleep.still[body]);
+        if pairs.iter().any(|pair| is_still(pair.first) && is_still(pair.second)) {
+            let found = self.detector.detect(self.system.scene(), &options)?;
+            self.keep(&found, new);
+        }
+        Ok(())
+    }
+
+    /// Keeps what was found between bodies that are still, of which one is `new`.
+    fn keep(&mut self, found: &Contacts, new: &[bool]) {
+        let Self { system, sleep, .. } = self;
+        let Sleep { still, pairs, .. } = sleep;
+        let mut keep = |a: InstanceId, b: InstanceId, contact: Option<Contact>, hidden| {
+            let (Some(x), Some(y)) = (system.body_of(a), system.body_of(b)) else { return };
+            if still[x] && still[y] && (new[x] || new[y]) {
+                let none = || Kept { bodies: [x, y], contacts: Vec::new(), hidden: None };
+                let kept = pairs.entry(Sleep::key(system, a, b)).or_insert_with(none);
+                kept.contacts.extend(contact);
+                kept.hidden = kept.hidden.or(hidden);
+            }
+        };
+        found.iter().for_each(|c| keep(c.instance_a, c.instance_b, Some(*c), None));
+        found.hidden.iter().for_each(|h| keep(h.instance_a, h.instance_b, None, Some(*h)));
+    }
+
+    /// Marks bodies as still in the scene.
+    fn mark(&mut self, still: &[bool]) {
+        let ids = self.system.bodies().iter().zip(still).filter(|(_, still)| **still);
+        let ids: Vec<_> = ids.map(|(body, _)| body.instance).collect();
+        self.system.set_still(ids);
+    }
+
+    /// Whether nothing moves in this step: all bodies are still.
+    pub(super) fn is_all_still(&self) -> bool {
+        self.sleeps() && self.sleep.still.iter().all(|still| *still)
+    }
+
+    /// Wakes what the contacts of a look touch. Returns whether there was something: the part is then
+    /// to be solved anew.
+    pub(super) fn wakes(&mut self, contacts: &[Contact]) -> bool {
+        if !self.sleeps() {
+            return false;
+        }
+        let (system, sleep) = (&self.system, &mut self.sleep);
+        let touched = sleep.touched(pairs_of(contacts, system), system);
+        if touched.is_empty() {
+            return false;
+        }
+        sleep.wake(touched, system);
+        let still = sleep.still.clone();
+        self.mark(&still);
+        true
+    }
+
+    /// The contacts of a step, which has found these.
+    pub(super) fn with_kept(&self, found: Contacts) -> Contacts {
+        if self.sleeps() { self.sleep.with_kept(found, &self.system) } else { found }
+    }
+
+    /// The pairs of free or kinematic bodies that contacts connect.
+    pub(super) fn touching(&self, contacts: &[Contact]) -> Vec<[usize; 2]> {
+        if !self.sleeps() {
+            return Vec::new();
+        }
+        let moves = |body: &usize| self.system.bodies()[*body].mass != Mass::Fixed;
+        let mut pairs: Vec<_> =
+            pairs_of(contacts, &self.system).filter(|pair| pair.iter().all(moves)).collect();
+        pairs.dedup();
+        pairs
+    }
+
+    /// After a step: lets islands fall asleep that have been at rest for long. `touching` are the
+    /// pairs of bodies that contacts connect. Returns the number of bodies that are asleep.
+    pub(super) fn end_sleep(&mut self, h: f64, touching: &[[usize; 2]]) -> Result<usize, DynamicsError> {
+        if !self.sleeps() {
+            return Ok(0);
+        }
+        let NewtonOptions { sleep: longest, .. } = self.options;
+        self.sleep.count(self.system.states(), &self.sizes, h, longest);
+        let (system, sleep) = (&self.system, &self.sleep);
+        let mut rests: Vec<bool> = sleep.rests.iter().map(|rest| rest.time >= longest).collect();
+        let mut parent: Vec<usize> = (0..rests.len()).collect();
+        for [a, b] in touching.iter().copied().chain(joined(system)) {
+            match [a, b].map(|body| is_free(system, body)) {
+                [true, true] => {
+                    let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+                    parent[a.max(b)] = a.min(b);
+                }
+                // What a kinematic body moves is not at rest, although it may stay where it is.
+                [true, false] => rests[a] &= sleep.still[b],
+                [false, true] => rests[b] &= sleep.still[a],
+                [false, false] => {}
+            }
+        }
+        let mut of_island = vec![true; rests.len()];
+        for (body, rests) in rests.iter().enumerate() {
+            of_island[root(&mut parent, body)] &= rests;
+        }
+        let mut states = system.states().to_vec();
+        let mut asleep = 0;
+        for (body, state) in states.iter_mut().enumerate().filter(|(body, _)| is_free(system, *body)) {
+            if of_island[root(&mut parent, body)] {
+                *state = State::at_rest(state.pose);
+                asleep += 1;
+            }
+        }
+        self.system.set_states(states)?;
+        Ok(asleep)
+    }
+
+    /// After a step, also one that failed: whoever uses the scene finds all pairs.
+    pub(super) fn unmark(&mut self) {
+        if self.sleeps() {
+            self.system.set_still([]);
+        }
+    }
+
+    pub(super) fn set_state_awake(&mut self, body: usize, state: State) -> Result<(), DynamicsError> {
+        let before = self.system.states().get(body).copied();
+        if before == Some(state) {
+            return Ok(());
+        }
+        self.system.set_state(body, state)?;
+        let Some(before) = before else { return Ok(()) };
+        let pose = self.system.states()[body].pose;
+        self.sleep.displaced[body] |= pose != before.pose;
+        // Setting a velocity may round the pose.
+        if way(before.pose, pose, self.sizes[body]) > STAYS {
+            self.sleep.disturb(body, &self.system);
+        }
+        self.sleep.rests[body] = Rest { place: pose, time: 0.0 };
+        Ok(())
+    }
+
+    pub(super) fn set_motor_awake(
+        &mut self,
+        joint: usize,
+        motor: Option<Motor>,
+    ) -> Result<(), DynamicsError> {
+        let before = self.system.joints().get(joint).map(|joint| joint.motor);
+        self.system.set_motor(joint, motor)?;
+        if before != Some(motor) {
+            let joint = &self.system.joints()[joint];
+            [Some(joint.child), joint.parent]
+                .into_iter()
+                .flatten()
+                .for_each(|b| self.sleep.rests[b].time = 0.0);
+        }
+        Ok(())
+    }
+
+    pub(super) fn set_wrench_awake(&mut self, body: usize, wrench: Wrench) -> Result<(), DynamicsError> {
+        let before = self.system.wrenches().get(body).copied();
+        self.system.set_wrench(body, wrench)?;
+        if before != Some(wrench) {
+            self.sleep.rests[body].time = 0.0;
+        }
+        Ok(())
+    }
+
+    /// Wakes all bodies.
+    pub(super) fn wake_all(&mut self) {
+        self.sleep.rests.iter_mut().for_each(|rest| rest.time = 0.0);
+    }
+
+    /// Takes over the states after a step of `time_step` seconds, or those at the beginning of a run.
+    pub(super) fn recall_states(
+        &mut self,
+        states: Vec<State>,
+        time_step: Option<f64>,
+    ) -> Result<bool, DynamicsError> {
+        if !self.sleeps() {
+            return Ok(false);
+        }
+        self.system.set_states(states)?;
+        match time_step {
+            Some(h) => self.sleep.count(self.system.states(), &self.sizes, h, self.options.sleep),
+            None => self.sleep = Sleep::new(self.system.states()),
+        }
+        Ok(true)
+    }
+}
+
+/// A bound of the way of the points of a body of diagonal `size` between two poses, m.
+fn way(from: Pose, to: Pose, size: f64) -> f64 {
+    // Planes are infinite.
+    let turned = match to.rotation == from.rotation {
+        true => 0.0,
+        false => 2.0 * (to.rotation * from.rotation.inverse()).xyz().length() * size,
+    };
+    from.translation.distance(to.translation) + turned
+}
+
+fn is_free(system: &System, body: usize) -> bool {
+    matches!(system.bodies()[body].mass, Mass::Free(_))
+}
+
+/// The pairs of bodies that joints connect.
+fn joined(system: &System) -> impl Iterator<Item = [usize; 2]> {
+    system.joints().iter().filter_map(|joint| Some([joint.parent?, joint.child]))
+}
+
+/// The pairs of bodies of contacts.
+fn pairs_of(contacts: &[Contact], system: &System) -> impl Iterator<Item = [usize; 2]> {
+    // The contacts of a pair of instances follow each other.
+    let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
+    let pairs = contacts.chunk_by(move |x, y| ids(x) == ids(y));
+    pairs.filter_map(|of_pair| {
+        let Contact { instance_a, instance_b, .. } = of_pair[0];
+        Some([system.body_of(instance_a)?, system.body_of(instance_b)?])
+    })
+}
