@@ -195,16 +195,13 @@ impl Dynamics for RapierEngine {
             contacts: self.contacts.len(),
             deepest: self.contacts.iter().map(|c| c.distance).reduce(f64::min),
             detections: 1,
-            advances: 0,
             parts: 1,
-            followed: 0,
-            divided: 0,
-            unbounded: 0,
             islands: 1,
             iterations: self.options.substeps as u32,
             converged: true,
             detection: found.time,
             solution: begin.elapsed().saturating_sub(found.time),
+            ..StepReport::default()
         };
         self.world = Some(world);
         Ok(report)

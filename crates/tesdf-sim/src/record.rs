@@ -116,10 +116,12 @@ pub enum RecordError {
     #[error("not a run of tesdf: {0}; `tesdf simulate` writes runs")]
     NotARun(String),
     /// The file has another format version.
-    #[error("the run has version {found}; this build reads {RUN_VERSION}: simulate the scene again")]
+    #[error("the run has version {found}; this build reads {reads}: simulate the scene again")]
     Version {
         /// The version in the file.
         found: u32,
+        /// That which this build reads.
+        reads: u32,
     },
     /// The run is complete, so there is nothing to resume.
     #[error("the run is complete: it has all of its {steps} steps")]
@@ -358,7 +360,7 @@ impl RunRecord {
         let About { version, bodies, scene, folder, planned } =
             serde_json::from_str(about).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
         if version != RUN_VERSION {
-            return Err(RecordError::Version { found: version });
+            return Err(RecordError::Version { found: version, reads: RUN_VERSION });
         }
         let file = SafeTensors::deserialize(bytes)?;
         let count = bodies.len();

@@ -176,7 +176,7 @@ impl InterruptedRun {
         let version = bytes.get(MAGIC.len()..HEAD).and_then(|version| version.try_into().ok());
         match version.map(u32::from_le_bytes) {
             Some(JOURNAL_VERSION) => {}
-            Some(found) => return Err(RecordError::Version { found }),
+            Some(found) => return Err(RecordError::Version { found, reads: JOURNAL_VERSION }),
             None => return Err(RecordError::NotARun(NO_STATE.into())),
         }
         let mut frames = Frames { bytes: &bytes, at: HEAD, number: 0 };

@@ -232,7 +232,7 @@ fn files_that_are_no_runs_are_refused() {
     let mut newer = bytes.clone();
     newer[at] = b'9';
     let refused = RunRecord::from_bytes(&newer);
-    assert!(matches!(refused, Err(RecordError::Version { found: 9 })), "{refused:?}");
+    assert!(matches!(refused, Err(RecordError::Version { found: 9, .. })), "{refused:?}");
     assert!(matches!(RunRecord::open(Path::new("none")), Err(RecordError::Read { .. })));
 }
 
