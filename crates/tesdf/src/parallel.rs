@@ -6,6 +6,13 @@ mod threads {
     pub use rayon::join;
     pub use rayon::prelude::*;
 
+    /// Runs `work` on a thread of the pool. Each parallel call from outside it costs two switches of
+    /// threads, and all those of `work` together cost no more.
+    #[cfg(feature = "collide")]
+    pub fn in_pool<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+        rayon::scope(|_| work())
+    }
+
     /// Joins all items by an associative function, beginning with `identity`.
     pub fn reduce<I: ParallelIterator>(
         items: I,
@@ -40,6 +47,12 @@ mod threads {
     /// Runs both functions, one after the other.
     pub fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
         (a(), b())
+    }
+
+    /// Runs `work`.
+    #[cfg(feature = "collide")]
+    pub fn in_pool<R>(work: impl FnOnce() -> R) -> R {
+        work()
     }
 
     /// Joins all items, beginning with `identity`.

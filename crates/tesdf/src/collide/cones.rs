@@ -151,7 +151,7 @@ impl<'a> Cones<'a> {
                 }
             }
             // The plane of the face: the way to it from the nearest point of b.
-            ([m], ..) => match (Cone::new(of_b).is_near(-*m), is_apart) {
+            ([m], ..) => match (Cone::new(of_b.iter().copied()).is_near(-*m), is_apart) {
                 (false, _) => otherwise,
                 (true, true) => self.turned(contact, -*m),
                 (true, false) => along(-*m),
@@ -167,7 +167,7 @@ impl<'a> Cones<'a> {
                 // The distance along the common normal of two edges is the same between all points
                 // of their lines.
                 let n = if across.dot(normal) < 0.0 { -across } else { across };
-                if Cone::opposite(&of_a).is_near(n) && Cone::new(of_b).is_near(n) {
+                if Cone::opposite(&of_a).is_near(n) && Cone::new(of_b.iter().copied()).is_near(n) {
                     let distance = if is_apart { n.dot(point_a - point_b) } else { distance };
                     Some(Contact { normal: n, distance, ..contact })
                 } else if is_apart {
@@ -178,13 +178,13 @@ impl<'a> Cones<'a> {
             }
             _ if is_apart => {
                 // The gradient of the exact place is in both cones.
-                let within = clamped(&Cone::opposite(&of_a), &Cone::new(of_b), normal);
+                let within = clamped(&Cone::opposite(&of_a), &Cone::new(of_b.iter().copied()), normal);
                 within.and_then(|normal| self.turned(contact, normal)).or(keep)
             }
             _ => {
                 // The mean is the same in both orders of a pair. The gradient, moved into the
                 // cones, is not: two such contacts would be a notch that locks.
-                let rays = common(&Cone::opposite(&of_a), &Cone::new(of_b));
+                let rays = common(&Cone::opposite(&of_a), &Cone::new(of_b.iter().copied()));
                 match rays.iter().sum::<DVec3>().try_normalize() {
                     Some(mean) => along(mean),
                     None if rays.is_empty() => otherwise,
@@ -402,21 +402,24 @@ fn least_cosine() -> f64 {
 struct Cone {
     rays: Normals,
     /// The cross products of each two rays, in the order of the first one.
-    crosses: ArrayVec<DVec3, { MOST * (MOST - 1) / 2 }>,
+    crosses: Crosses,
 }
 
+type Crosses = ArrayVec<DVec3, { MOST * (MOST - 1) / 2 }>;
+
 impl Cone {
-    fn new(rays: Normals) -> Self {
-        let mut crosses = ArrayVec::new();
-        for (i, p) in rays.iter().enumerate() {
-            crosses.extend(rays[i + 1..].iter().map(|q| p.cross(*q)));
+    fn new(rays: impl Iterator<Item = DVec3>) -> Self {
+        let mut cone = Self { rays: Normals::new(), crosses: Crosses::new() };
+        cone.rays.extend(rays);
+        for (i, p) in cone.rays.iter().enumerate() {
+            cone.crosses.extend(cone.rays[i + 1..].iter().map(|q| p.cross(*q)));
         }
-        Self { rays, crosses }
+        cone
     }
 
     /// The cone of the opposite directions.
     fn opposite(normals: &[DVec3]) -> Self {
-        Self::new(normals.iter().map(|n| -*n).collect())
+        Self::new(normals.iter().map(|n| -*n))
     }
 
     /// The cross product of the rays `i` and `j`, where `i` is less than `j`.
@@ -454,28 +457,43 @@ impl Cone {
         };
         for (i, &p) in self.rays.iter().enumerate() {
             offer(p);
-            for (j, &q) in self.rays.iter().enumerate().skip(i + 1) {
-                // The foot of v on the plane of two rays, if it is between them.
-                let across = self.cross(i, j);
-                let square = across.length_squared();
-                if square <= f64::MIN_POSITIVE {
-                    continue;
-                }
-                let foot = v - v.dot(across) / square * across;
-                if p.cross(foot).dot(across) >= 0.0
-                    && foot.cross(q).dot(across) >= 0.0
-                    && let Some(foot) = foot.try_normalize()
-                {
-                    offer(foot);
-                }
-            }
+            (i + 1..self.rays.len()).filter_map(|j| self.foot(i, j, v)).for_each(&mut offer);
         }
         best.1
     }
 
+    /// The direction nearest to `v` between the rays `i` and `j`; `None` where it is one of them.
+    fn foot(&self, i: usize, j: usize, v: DVec3) -> Option<DVec3> {
+        let (p, q, across) = (self.rays[i], self.rays[j], self.cross(i, j));
+        let square = across.length_squared();
+        if square <= f64::MIN_POSITIVE {
+            return None;
+        }
+        let foot = v - v.dot(across) / square * across;
+        let is_between = p.cross(foot).dot(across) >= 0.0 && foot.cross(q).dot(across) >= 0.0;
+        if is_between { foot.try_normalize() } else { None }
+    }
+
+    /// Whether the cosine between a direction and the [`nearest`](Self::nearest) one of the cone is at
+    /// least this. Most contacts ask this often, and one direction of the cone is enough to tell.
+    fn is_within(&self, v: DVec3, least: f64) -> bool {
+        if self.rays.iter().any(|ray| ray.dot(v) >= least) {
+            return true;
+        }
+        // Planes at a greater angle have no such direction; far more than rounding is added.
+        let sine_squared = 1.0 - least * least + 1e-12;
+        let mut pairs = (0..self.rays.len()).flat_map(|i| (i + 1..self.rays.len()).map(move |j| (i, j)));
+        let is_beside = |(i, j)| {
+            let across = self.cross(i, j);
+            v.dot(across).powi(2) <= sine_squared * across.length_squared()
+                && self.foot(i, j, v).is_some_and(|foot| foot.dot(v) >= least)
+        };
+        pairs.any(is_beside) || self.is_inside(v)
+    }
+
     /// Whether a direction is in the cone, up to [`SLOPE`].
     fn is_near(&self, direction: DVec3) -> bool {
-        self.nearest(direction).dot(direction) > least_cosine()
+        self.is_within(direction, least_cosine())
     }
 }
 
@@ -501,21 +519,23 @@ fn crossing([a, b]: [&DVec3; 2], [c, d]: [&DVec3; 2]) -> Option<DVec3> {
 }
 
 /// The extreme rays of what two cones have in common.
-fn common(one: &Cone, other: &Cone) -> Vec<DVec3> {
+fn common(one: &Cone, other: &Cone) -> ArrayVec<DVec3, { 4 * MOST }> {
     let least = NEAR.cos();
-    let holds = |cone: &Cone, ray: DVec3| cone.nearest(ray).dot(ray) >= least;
-    let mut rays: Vec<DVec3> = Vec::new();
+    let holds = |cone: &Cone, ray: DVec3| cone.is_within(ray, least);
+    let mut rays = ArrayVec::<DVec3, { 4 * MOST }>::new();
+    // There are at most as many as both have together, and some that rounding adds.
     let mut offer = |ray: DVec3| {
-        if rays.iter().all(|r| r.distance(ray) > 2.0 * NEAR) {
+        if !rays.is_full() && rays.iter().all(|r| r.distance(ray) > 2.0 * NEAR) {
             rays.push(ray);
         }
     };
     one.rays.iter().filter(|ray| holds(other, **ray)).for_each(|ray| offer(*ray));
     other.rays.iter().filter(|ray| holds(one, **ray)).for_each(|ray| offer(*ray));
     // The lines in which a side of one crosses a side of the other.
-    let unit = |cone: &Cone| cone.crosses.iter().filter_map(|n| n.try_normalize()).collect::<Vec<_>>();
-    let (sides, others) = (unit(one), unit(other));
-    for side in sides {
+    let unit = |cross: &DVec3| cross.try_normalize();
+    let mut others = Crosses::new();
+    others.extend(other.crosses.iter().filter_map(unit));
+    for side in one.crosses.iter().filter_map(unit) {
         for line in others.iter().map(|other| side.cross(*other)) {
             let Some(ray) = line.try_normalize().filter(|_| line.length() > NEAR) else { continue };
             for ray in [ray, -ray] {
@@ -660,19 +680,24 @@ mod tests {
 
     #[test]
     fn the_nearest_direction_of_a_cone_is_in_it() {
-        let normals = |rays: &[DVec3]| rays.iter().map(|ray| ray.normalize()).collect();
-        let cone = Cone::new(normals(&[DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE]));
-        assert_eq!(cone.nearest(DVec3::ONE.normalize()), DVec3::ONE.normalize());
+        let cone = |rays: &[DVec3]| Cone::new(rays.iter().map(|ray| ray.normalize()));
+        let sector = cone(&[DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE]);
+        assert_eq!(sector.nearest(DVec3::ONE.normalize()), DVec3::ONE.normalize());
         let aside = DVec3::new(1.0, 1.0, -0.5).normalize();
-        assert!(cone.nearest(aside).distance(DVec3::new(1.0, 1.0, 0.0).normalize()) < 1e-15);
-        assert!(cone.nearest(DVec3::new(2.0, -1.0, -1.0).normalize()).distance(DVec3::X) < 1e-15);
+        assert!(sector.nearest(aside).distance(DVec3::new(1.0, 1.0, 0.0).normalize()) < 1e-15);
+        assert!(sector.nearest(DVec3::new(2.0, -1.0, -1.0).normalize()).distance(DVec3::X) < 1e-15);
+        for k in 0..1000u32 {
+            let v = DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)) - 4.6;
+            let (v, cosine) = (v.normalize(), sector.nearest(v.normalize()).dot(v.normalize()));
+            assert!(sector.is_within(v, cosine - 1e-12));
+            assert!(sector.is_inside(v) || !sector.is_within(v, cosine + 1e-12));
+        }
         // Two arcs that have one direction in common.
-        let (one, other) =
-            (Cone::new(normals(&[DVec3::Z, DVec3::X])), Cone::new(normals(&[DVec3::Z, -DVec3::X])));
+        let (one, other) = (cone(&[DVec3::Z, DVec3::X]), cone(&[DVec3::Z, -DVec3::X]));
         let tilted = DVec3::new(0.03, 0.0, 1.0).normalize();
         assert!(clamped(&one, &other, tilted).is_some_and(|n| n.distance(DVec3::Z) < 1e-12));
-        assert_eq!(common(&one, &other), [DVec3::Z]);
-        let apart = Cone::new(normals(&[-DVec3::Z, DVec3::Y]));
+        assert_eq!(common(&one, &other).as_slice(), [DVec3::Z]);
+        let apart = cone(&[-DVec3::Z, DVec3::Y]);
         assert!(common(&one, &apart).is_empty());
     }
 }

@@ -15,6 +15,9 @@ use super::{
 /// Number of faces or nodes per task.
 const TASK: usize = 64;
 
+/// Two bodies with so few faces are detected on the calling thread.
+const FEW: u32 = 32;
+
 /// For detections that nobody stops.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
@@ -130,6 +133,22 @@ fn different(contacts: Vec<Contact>, pairs: &[OrderedPair]) -> Vec<Contact> {
 
 /// The contacts of ordered pairs. Once `stop` is set, contacts are missing.
 fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) -> Contacts {
+    // A box on a table takes less time than another thread takes to wake up.
+    let is_small = pairs.len() <= 2 && pairs.iter().map(|pair| pair.surface.face_count()).sum::<u32>() <= FEW;
+    if is_small {
+        of_pairs_by(pairs, options, stop, is_small)
+    } else {
+        in_pool(|| of_pairs_by(pairs, options, stop, is_small))
+    }
+}
+
+/// As [`of_pairs`], on the calling thread where they are few.
+fn of_pairs_by(
+    pairs: &[OrderedPair],
+    options: &CollideOptions,
+    stop: &AtomicBool,
+    is_small: bool,
+) -> Contacts {
     let stopped = || stop.load(Ordering::Relaxed);
     match options.reduction {
         Reduction::Deepest(n) => {
@@ -141,12 +160,18 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) 
         Reduction::None | Reduction::PerPair(_) => {}
     }
     let candidates_of = |pair: &OrderedPair| if stopped() { Candidates::new() } else { pair.candidates() };
-    let candidates: Vec<Candidates> = pairs.par_iter().map(candidates_of).collect();
+    let candidates: Vec<Candidates> = match is_small {
+        true => pairs.iter().map(candidates_of).collect(),
+        false => pairs.par_iter().map(candidates_of).collect(),
+    };
     let tasks = tasks(pairs, &candidates);
     let contacts_of = |(pair, chunk): &(&OrderedPair, &[u32])| {
         if stopped() { Found::default() } else { contacts(pair, chunk) }
     };
-    let found: Vec<Found> = tasks.par_iter().map(contacts_of).collect();
+    let found: Vec<Found> = match is_small {
+        true => tasks.iter().map(contacts_of).collect(),
+        false => tasks.par_iter().map(contacts_of).collect(),
+    };
     let mut statistics = Statistics {
         instance_pairs: pairs.len(),
         candidates: candidates.iter().map(Vec::len).sum(),

@@ -347,7 +347,11 @@ impl CellField<'_> {
     pub fn value(&self, p: DVec3, precision: Precision) -> FieldValue {
         match *self {
             Self::Mesh { asset, place, faces } => asset.find(p, place, faces, precision).into(),
-            Self::Whole(Surroundings { asset, .. }) => asset.found_at(p, asset.locate(p), precision).into(),
+            Self::Whole(around) => {
+                let known = around.found(p).filter(|_| precision == Precision::F64);
+                let asset = around.asset;
+                known.unwrap_or_else(|| asset.found_at(p, asset.locate(p), precision)).into()
+            }
             Self::Simple(simple) => simple.value(p),
         }
     }
@@ -365,8 +369,10 @@ impl CellField<'_> {
     /// As [`Field::rough`]; for a cell of a mesh, from all its faces.
     pub fn rough(&self, p: DVec3) -> (f64, f64) {
         match *self {
-            Self::Mesh { asset, .. } | Self::Whole(&Surroundings { asset, .. }) => {
-                Field::Mesh(asset).rough(p)
+            Self::Mesh { asset, .. } => Field::Mesh(asset).rough(p),
+            Self::Whole(around) => {
+                let distance = around.found_exactly(p).signed_distance;
+                (distance, ROUNDING + FAR * distance.abs())
             }
             Self::Simple(simple) => Field::Simple(simple).rough(p),
         }
@@ -396,9 +402,8 @@ impl CellField<'_> {
     pub fn opposing(&self, p: DVec3, normal: DVec3, precision: Precision) -> FieldValue {
         match (*self, precision) {
             (Self::Mesh { asset, place, faces }, Precision::F64) => asset.opposing(p, normal, place, faces),
-            (Self::Whole(Surroundings { asset, .. }), Precision::F64) => {
-                asset.opposing_at(p, normal, asset.locate(p))
-            }
+            (Self::Whole(around), Precision::F64) => around
+                .with_near(p, TIE, |found, near| around.asset.opposing_of(p, normal, found.into(), near)),
             _ => self.most_opposing(p, normal, self.value(p, precision), precision),
         }
     }
@@ -458,16 +463,6 @@ impl TeSdf {
         })
     }
 
-    /// As [`opposing`](Self::opposing), with the list of the place.
-    fn opposing_at(&self, p: DVec3, normal: DVec3, place: Place) -> FieldValue {
-        match place {
-            Place::Listed { offset, .. } => {
-                self.with_list(offset, |faces| self.opposing(p, normal, place, faces))
-            }
-            _ => self.opposing(p, normal, place, &Faces::default()),
-        }
-    }
-
     /// The value at `p` in `f64`. Of the equally near faces, the one whose gradient most opposes
     /// `normal`. `faces` are those of the place's list, if it has one.
     fn opposing(&self, p: DVec3, normal: DVec3, place: Place, faces: &Faces) -> FieldValue {
@@ -476,12 +471,17 @@ impl TeSdf {
         }
         NEAR.with_borrow_mut(|near| {
             let value = self.found_with_near(p, place, faces, TIE, near).into();
-            if near.len() == 1 && !is_on_surface(&value, TIE) || opposes(&value, normal) {
-                return value;
-            }
-            self.most_opposing(p, normal, value, TIE, |offer| {
-                near.iter().for_each(|(face, closest)| offer(*face, *closest));
-            })
+            self.opposing_of(p, normal, value, near)
+        })
+    }
+
+    /// As [`opposing`](Self::opposing), where the value at `p` and the faces near it are known.
+    fn opposing_of(&self, p: DVec3, normal: DVec3, value: FieldValue, near: &[(u32, Closest)]) -> FieldValue {
+        if near.len() == 1 && !is_on_surface(&value, TIE) || opposes(&value, normal) {
+            return value;
+        }
+        self.most_opposing(p, normal, value, TIE, |offer| {
+            near.iter().for_each(|(face, closest)| offer(*face, *closest));
         })
     }
 

@@ -3,7 +3,6 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::clearance::Body;
 use super::motion::{Motion, Twist};
-use super::simple::Simple;
 use super::{CollideError, Placement, Shape};
 use crate::asset::layout::TreeChild;
 use crate::geometry::Triangle;
@@ -55,7 +54,7 @@ impl<'a> MovingBody<'a> {
             Shape::Mesh(asset) => (Vec::new(), asset.half_thickness * asset.frame.inverse_scale()),
             // A plane is the half-space of a direction, so one of its points stands for it.
             Shape::Plane => (vec![vec![DVec3::ZERO]], 0.0),
-            shape => Simple::from(shape).parts(),
+            shape => shape.parts(),
         };
         Ok(Self { shape, placement, motion, origin, twist, simple, radius: radius * placement.scale })
     }

@@ -94,7 +94,10 @@ impl Shape {
     pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
         match self {
             Self::Mesh(_) | Self::Plane => (Vec::new(), 0.0),
-            simple => Simple::from(simple).parts(),
+            simple => {
+                let simple = Simple::from(simple);
+                (simple.parts().map(|points| points.to_vec()).collect(), simple.radius())
+            }
         }
     }
 
@@ -102,7 +105,7 @@ impl Shape {
     pub fn nodes(&self) -> Vec<(DVec3, u32)> {
         match self {
             Self::Mesh(_) | Self::Plane => Vec::new(),
-            simple => Simple::from(simple).nodes().0,
+            simple => Simple::from(simple).nodes().collect(),
         }
     }
 

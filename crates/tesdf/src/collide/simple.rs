@@ -1,4 +1,5 @@
 //! Planes, boxes, spheres and capsules: their fields as formulas, and the parts of their surfaces.
+use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::field_value::FieldValue;
@@ -84,65 +85,92 @@ impl Simple {
         }
     }
 
-    /// The parts that represent the surface: convex polygons of up to three points, and a radius
-    /// within which the surface lies.
+    /// Number of parts that represent the surface: convex polygons of up to three points. The surface
+    /// lies within the [`radius`](Self::radius) of them.
     ///
     /// A box has twelve triangles, two for each side in the order of [`value`](Self::value). A
     /// sphere has its centre, a capsule its segment. A plane has no corners; see [`plane_square`].
-    pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
+    pub fn part_count(&self) -> u32 {
+        match self {
+            Self::Plane => 0,
+            Self::Box(_) => TRIANGLES.len() as u32,
+            Self::Round { .. } => 1,
+        }
+    }
+
+    /// The points of a part; none where there is no such part.
+    pub fn part(&self, part: u32) -> Points {
         match *self {
-            Self::Plane => (Vec::new(), 0.0),
-            Self::Box(half) => (box_triangles(half), 0.0),
-            Self::Round { half_height: 0.0, radius } => (vec![vec![DVec3::ZERO]], radius),
-            Self::Round { half_height, radius } => {
-                (vec![vec![DVec3::new(0.0, 0.0, -half_height), DVec3::new(0.0, 0.0, half_height)]], radius)
+            _ if part >= self.part_count() => Points::new(),
+            Self::Plane => Points::new(),
+            Self::Box(half) => Points::from(TRIANGLES[part as usize].map(|corner| box_corner(half, corner))),
+            Self::Round { .. } => self.nodes().map(|(end, _)| end).collect(),
+        }
+    }
+
+    /// All parts.
+    pub fn parts(&self) -> impl Iterator<Item = Points> {
+        let simple = *self;
+        (0..self.part_count()).map(move |part| simple.part(part))
+    }
+
+    /// The surface lies within this distance of the parts.
+    pub fn radius(&self) -> f64 {
+        if let Self::Round { radius, .. } = *self { radius } else { 0.0 }
+    }
+
+    /// The edges: twelve of a box, the segment of a capsule.
+    pub fn edges(&self) -> impl Iterator<Item = SimpleEdge> {
+        let count = match *self {
+            Self::Box(_) => EDGES.len(),
+            Self::Round { half_height, .. } if half_height != 0.0 => 1,
+            Self::Plane | Self::Round { .. } => 0,
+        };
+        let simple = *self;
+        (0..count).map(move |k| match simple {
+            Self::Box(half) => box_edge(half, EDGES[k]),
+            _ => {
+                let points = [0, 1].map(|end| simple.node(end));
+                SimpleEdge { id: 0, points, normals: [DVec3::ZERO; 2] }
+            }
+        })
+    }
+
+    /// Number of distinct points of the parts.
+    pub fn node_count(&self) -> u32 {
+        match *self {
+            Self::Plane => 0,
+            Self::Box(_) => NODES.len() as u32,
+            Self::Round { half_height, .. } => 1 + u32::from(half_height != 0.0),
+        }
+    }
+
+    /// A distinct point of the parts.
+    pub fn node(&self, node: u32) -> DVec3 {
+        match *self {
+            Self::Plane => DVec3::ZERO,
+            Self::Box(half) => box_corner(half, NODES[node as usize].0),
+            Self::Round { half_height: 0.0, .. } => DVec3::ZERO,
+            Self::Round { half_height, .. } => {
+                DVec3::new(0.0, 0.0, if node == 0 { -half_height } else { half_height })
             }
         }
     }
 
-    /// The edges: twelve of a box, the segment of a capsule. The surface lies within the radius.
-    pub fn edges(&self) -> (Vec<SimpleEdge>, f64) {
-        let (parts, radius) = self.parts();
-        let mut edges: Vec<SimpleEdge> = Vec::new();
-        for (part, points) in (0..).zip(&parts) {
-            for side in 0..if points.len() == 3 { 3 } else { points.len() as u32 - 1 } {
-                let [p, q] = [side, side + 1].map(|k| points[k as usize % points.len()]);
-                let normals = match *self {
-                    Self::Box(half) => {
-                        // The side lies in the sides of the box where both ends do.
-                        let outward = |axis: usize| {
-                            let is_common = p[axis] == q[axis] && p[axis].abs() == half[axis];
-                            is_common.then(|| DVec3::AXES[axis] * p[axis].signum())
-                        };
-                        let outward: Vec<DVec3> = (0..3).filter_map(outward).collect();
-                        // The diagonal of a side is no edge.
-                        let &[first, second] = outward.as_slice() else { continue };
-                        [first, second]
-                    }
-                    _ => [DVec3::ZERO; 2],
-                };
-                if edges.iter().all(|e| e.points != [p, q] && e.points != [q, p]) {
-                    edges.push(SimpleEdge { id: 3 * part + side, points: [p, q], normals });
-                }
-            }
-        }
-        (edges, radius)
+    /// The lowest part that has a node.
+    pub fn part_of_node(&self, node: u32) -> u32 {
+        if let Self::Box(_) = self { NODES[node as usize].1 } else { 0 }
     }
 
     /// The distinct points of the parts, each with the lowest part that has it.
-    pub fn nodes(&self) -> (Vec<(DVec3, u32)>, f64) {
-        let (parts, radius) = self.parts();
-        let mut nodes: Vec<(DVec3, u32)> = Vec::new();
-        for (part, points) in parts.iter().enumerate() {
-            for &p in points {
-                if nodes.iter().all(|(q, _)| *q != p) {
-                    nodes.push((p, part as u32));
-                }
-            }
-        }
-        (nodes, radius)
+    pub fn nodes(&self) -> impl Iterator<Item = (DVec3, u32)> {
+        let simple = *self;
+        (0..self.node_count()).map(move |node| (simple.node(node), simple.part_of_node(node)))
     }
 }
+
+/// The points of a part.
+pub type Points = ArrayVec<DVec3, 3>;
 
 /// An edge of a box, or the core of a capsule.
 #[derive(Clone, Copy, Debug)]
@@ -174,23 +202,73 @@ fn box_value(p: DVec3, half: DVec3) -> (f64, DVec3, DVec3, u32) {
     (-depth[axis], gradient, closest, side)
 }
 
-fn box_triangles(half: DVec3) -> Vec<Vec<DVec3>> {
-    let mut triangles = Vec::with_capacity(12);
-    for axis in 0..3 {
-        for sign in [-1.0, 1.0] {
-            let corner = |u: f64, v: f64| {
-                let mut p = DVec3::ZERO;
-                p[axis] = sign * half[axis];
-                p[(axis + 1) % 3] = u * half[(axis + 1) % 3];
-                p[(axis + 2) % 3] = sign * v * half[(axis + 2) % 3];
-                p
-            };
-            let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-            triangles.push(vec![a, b, c]);
-            triangles.push(vec![a, c, d]);
-        }
+// The faces, corners and edges of all boxes are the same but for the lengths, so they are tables: a
+// detection asks for them at each contact. A corner is a number whose bit k is set where its
+// coordinate k is positive.
+
+/// The triangles: two for each side.
+const TRIANGLES: [[usize; 3]; 12] = {
+    let mut triangles = [[0; 3]; 12];
+    let mut side = 0;
+    while side < 6 {
+        let (axis, is_high) = (side / 2, side % 2);
+        let (on_side, right, top) = (is_high << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+        // Seen from outside, the corners turn to the left on both sides of the axis.
+        let (from, to) = if is_high == 1 { (0, top) } else { (top, 0) };
+        let [a, b, c, d] = [on_side | from, on_side | right | from, on_side | right | to, on_side | to];
+        (triangles[2 * side], triangles[2 * side + 1]) = ([a, b, c], [a, c, d]);
+        side += 1;
     }
     triangles
+};
+
+/// The corners in the order in which the triangles have them, each with the first one.
+const NODES: [(usize, u32); 8] = {
+    let (mut nodes, mut count, mut seen) = ([(0, 0); 8], 0, 0);
+    let mut k = 0;
+    while k < 3 * TRIANGLES.len() {
+        let corner = TRIANGLES[k / 3][k % 3];
+        if seen >> corner & 1 == 0 {
+            seen |= 1 << corner;
+            nodes[count] = (corner, k as u32 / 3);
+            count += 1;
+        }
+        k += 1;
+    }
+    nodes
+};
+
+/// The edges in the same order: 3 × triangle + side, and the two corners. The diagonals of the sides
+/// are none.
+const EDGES: [(u32, [usize; 2]); 12] = {
+    let (mut edges, mut count, mut seen) = ([(0, [0; 2]); 12], 0, [0; 8]);
+    let mut k = 0;
+    while k < 3 * TRIANGLES.len() {
+        let (p, q) = (TRIANGLES[k / 3][k % 3], TRIANGLES[k / 3][(k + 1) % 3]);
+        if (p ^ q).is_power_of_two() && seen[p] >> q & 1 == 0 {
+            (seen[p], seen[q]) = (seen[p] | 1 << q, seen[q] | 1 << p);
+            edges[count] = (k as u32, [p, q]);
+            count += 1;
+        }
+        k += 1;
+    }
+    edges
+};
+
+fn box_corner(half: DVec3, corner: usize) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(
+        |axis| {
+            if corner >> axis & 1 == 1 { half[axis] } else { -half[axis] }
+        },
+    ))
+}
+
+fn box_edge(half: DVec3, (id, [p, q]): (u32, [usize; 2])) -> SimpleEdge {
+    let along = (p ^ q).trailing_zeros() as usize;
+    let outward = |axis: usize| DVec3::AXES[axis] * if p >> axis & 1 == 1 { 1.0 } else { -1.0 };
+    // The two other axes, the lower one first.
+    let normals = [usize::from(along == 0), if along == 2 { 1 } else { 2 }].map(outward);
+    SimpleEdge { id, points: [p, q].map(|corner| box_corner(half, corner)), normals }
 }
 
 /// The square of the plane z = 0 that contains all its points within `radius` of `center`, as two
@@ -203,6 +281,8 @@ pub fn plane_square(center: DVec3, radius: f64) -> [[DVec3; 3]; 2] {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::geometry::Triangle;
 
@@ -210,8 +290,7 @@ mod tests {
     fn the_distance_to_a_box_equals_that_to_its_triangles() {
         let half = DVec3::new(1.0, 2.0, 3.0);
         let simple = Simple::Box(half);
-        let triangles: Vec<Triangle> =
-            simple.parts().0.iter().map(|t| Triangle::new([t[0], t[1], t[2]])).collect();
+        let triangles: Vec<Triangle> = simple.parts().map(|t| Triangle::new([t[0], t[1], t[2]])).collect();
         for (side, t) in triangles.iter().enumerate() {
             let axis = side / 4;
             let outward = if side % 4 < 2 { -1.0 } else { 1.0 };
@@ -244,22 +323,33 @@ mod tests {
         assert_eq!(capsule.value(p).distance, 1.0);
         assert!((sphere.value(p).distance - (9.25f64.sqrt() - 2.0)).abs() < 1e-15);
         assert_eq!(sphere.value(DVec3::ZERO).distance, -2.0);
-        assert_eq!(capsule.nodes().0.len(), 2);
-        assert_eq!(Simple::Box(DVec3::ONE).nodes().0.len(), 8);
-        assert_eq!(capsule.edges().0.len(), 1);
-        assert!(sphere.edges().0.is_empty() && Simple::Plane.edges().0.is_empty());
+        assert_eq!(capsule.nodes().count(), 2);
+        assert_eq!(capsule.edges().count(), 1);
+        assert_eq!(sphere.edges().count() + Simple::Plane.edges().count(), 0);
     }
 
     #[test]
     fn a_box_has_twelve_edges() {
         let half = DVec3::new(1.0, 2.0, 3.0);
-        let (edges, _) = Simple::Box(half).edges();
-        assert_eq!(edges.len(), 12);
-        for SimpleEdge { id, points: [p, q], normals: [m, n] } in edges {
+        let simple = Simple::Box(half);
+        let ids: BTreeSet<u32> = simple.edges().map(|edge| edge.id).collect();
+        assert_eq!(ids.len(), 12);
+        for SimpleEdge { id, points: [p, q], normals: [m, n] } in simple.edges() {
             assert_eq!((p != q, m.dot(n), m.dot(p - q), n.dot(p - q)), (true, 0.0, 0.0, 0.0));
-            assert!(m.dot(p) > 0.0 && n.dot(p) > 0.0);
-            let part = &Simple::Box(half).parts().0[id as usize / 3];
+            assert!(m.dot(p) > 0.0 && n.dot(p) > 0.0 && m.dot(q) > 0.0 && n.dot(q) > 0.0);
+            let part = simple.part(id / 3);
             assert_eq!((part[id as usize % 3], part[(id as usize + 1) % 3]), (p, q));
+        }
+    }
+
+    #[test]
+    fn a_box_has_eight_corners() {
+        let simple = Simple::Box(DVec3::new(1.0, 2.0, 3.0));
+        let nodes: Vec<(DVec3, u32)> = simple.nodes().collect();
+        assert_eq!(nodes.len(), 8);
+        for (k, (node, part)) in nodes.iter().enumerate() {
+            assert!(nodes[..k].iter().all(|(other, _)| other != node));
+            assert_eq!(simple.parts().position(|points| points.contains(node)), Some(*part as usize));
         }
     }
 }

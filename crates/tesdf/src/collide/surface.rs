@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3, Vec3};
 use super::branch::Branch;
 use super::field::{Field, FieldBody};
 use super::reach::Reach;
-use super::simple::{Simple, plane_square};
+use super::simple::{Points, Simple, SimpleEdge, plane_square};
 use super::{Mode, Placement, Shape};
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
@@ -131,7 +131,7 @@ impl<'a> SurfaceBody<'a> {
                 self.visit_leaves(asset, field, reach, |start, count| faces.extend(start..start + count));
             }
             Shape::Plane => faces.extend(0..2),
-            simple => faces.extend(0..Simple::from(simple).parts().0.len() as u32),
+            simple => faces.extend(0..Simple::from(simple).part_count()),
         }
         faces
     }
@@ -152,7 +152,7 @@ impl<'a> SurfaceBody<'a> {
     /// all its nodes.
     pub fn nodes(&self, field: &FieldBody, reach: &Reach) -> Candidates {
         let Shape::Mesh(asset) = self.shape else {
-            return (0..Simple::from(self.shape).nodes().0.len() as u32).collect();
+            return (0..self.node_count()).collect();
         };
         let mut nodes = Vec::new();
         self.visit_leaves(asset, field, reach, |start, count| {
@@ -183,7 +183,7 @@ impl<'a> SurfaceBody<'a> {
         let first = self.node_count();
         match self.shape {
             Shape::Mesh(asset) => asset.sharp_edges(start, count).map(|edge| first + edge).collect(),
-            simple => Simple::from(simple).edges().0.iter().map(|edge| first + edge.id).collect(),
+            simple => Simple::from(simple).edges().map(|edge| first + edge.id).collect(),
         }
     }
 
@@ -210,9 +210,10 @@ impl<'a> SurfaceBody<'a> {
                 Part::new(&square[face as usize % 2].map(|p| self.to_field(p)), self.around)
             }
             simple => {
-                let (parts, radius) = Simple::from(simple).parts();
-                let points: Vec<DVec3> = parts[face as usize].iter().map(|&p| self.to_field(p)).collect();
-                Part::new(&points, radius * self.scale + self.around)
+                let simple = Simple::from(simple);
+                let mut points = simple.part(face);
+                points.iter_mut().for_each(|p| *p = self.to_field(*p));
+                Part::new(&points, simple.radius() * self.scale + self.around)
             }
         }
     }
@@ -252,8 +253,7 @@ impl<'a> SurfaceBody<'a> {
         let corners = match self.shape {
             Shape::Mesh(asset) => asset.face_corners(face as usize),
             Shape::Plane => return None,
-            simple => *<&[DVec3; 3]>::try_from(Simple::from(simple).parts().0.get(face as usize)?.as_slice())
-                .ok()?,
+            simple => Simple::from(simple).part(face).into_inner().ok()?,
         };
         Some(Triangle::new(corners.map(|p| self.to_field(p))))
     }
@@ -287,10 +287,10 @@ impl<'a> SurfaceBody<'a> {
                     .any(|other| shares(&asset.faces[other as usize]) && !is_level(other) && accept(other))
             }
             simple => {
-                let parts = Simple::from(simple).parts().0;
-                let own = &parts[face as usize];
-                let shares = |other: u32| corners.iter().all(|&k| parts[other as usize].contains(&own[k]));
-                (0..parts.len() as u32).any(|other| shares(other) && accept(other))
+                let simple = Simple::from(simple);
+                let own = simple.part(face);
+                let shares = |other: &Points| corners.iter().all(|&k| other.contains(&own[k]));
+                (0..).zip(simple.parts()).any(|(other, points)| shares(&points) && accept(other))
             }
         }
     }
@@ -303,8 +303,8 @@ impl<'a> SurfaceBody<'a> {
                 Part::new(&[self.to_field(at)], self.around)
             }
             simple => {
-                let (nodes, radius) = Simple::from(simple).nodes();
-                Part::new(&[self.to_field(nodes[node as usize].0)], radius * self.scale + self.around)
+                let simple = Simple::from(simple);
+                Part::new(&[self.to_field(simple.node(node))], simple.radius() * self.scale + self.around)
             }
         }
     }
@@ -325,11 +325,13 @@ impl<'a> SurfaceBody<'a> {
                 Part::edge(points, self.around, normals.into_iter())
             }
             simple => {
-                let (edges, radius) = Simple::from(simple).edges();
-                let found = edges.iter().find(|e| e.id == edge).unwrap_or(&edges[0]);
-                let normals = found.normals.map(|n| self.linear * n);
-                let radius = radius * self.scale + self.around;
-                Part::edge(found.points.map(|p| self.to_field(p)), radius, normals.into_iter())
+                let simple = Simple::from(simple);
+                let radius = simple.radius() * self.scale + self.around;
+                let Some(SimpleEdge { points, normals, .. }) = simple.edges().find(|e| e.id == edge) else {
+                    return Part::new(&[self.shift], radius);
+                };
+                let normals = normals.map(|n| self.linear * n);
+                Part::edge(points.map(|p| self.to_field(p)), radius, normals.into_iter())
             }
         }
     }
@@ -343,7 +345,7 @@ impl<'a> SurfaceBody<'a> {
                 let normal = |&face: &u32| asset.outward_normal(face, at);
                 asset.faces_at(node).iter().map(normal).sum()
             }
-            Shape::Box { .. } => Simple::from(self.shape).nodes().0[node as usize].0.signum(),
+            Shape::Box { .. } => Simple::from(self.shape).node(node).signum(),
             _ => DVec3::ZERO,
         };
         Part { normal: (self.linear * normal).normalize_or_zero(), ..self.node(node) }
@@ -375,7 +377,7 @@ impl<'a> SurfaceBody<'a> {
     pub fn face_of_node(&self, node: u32) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.lowest_faces()[node as usize],
-            simple => Simple::from(simple).nodes().0[node as usize].1,
+            simple => Simple::from(simple).part_of_node(node),
         }
     }
 
@@ -384,7 +386,7 @@ impl<'a> SurfaceBody<'a> {
         match self.shape {
             Shape::Mesh(asset) => asset.face_count() as u32,
             Shape::Plane => 2,
-            simple => Simple::from(simple).parts().0.len() as u32,
+            simple => Simple::from(simple).part_count(),
         }
     }
 
@@ -392,7 +394,7 @@ impl<'a> SurfaceBody<'a> {
     pub fn node_count(&self) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.vertices.len() as u32,
-            simple => Simple::from(simple).nodes().0.len() as u32,
+            simple => Simple::from(simple).node_count(),
         }
     }
 

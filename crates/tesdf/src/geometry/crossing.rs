@@ -42,6 +42,12 @@ use robust::{Coord, Coord3D};
 /// by 1 at each crossing, and decreases by 1 where the segment leaves through a front side.
 pub fn signed_crossing(x: DVec3, p: DVec3, triangle: [DVec3; 3]) -> i32 {
     let [a, b, c] = triangle;
+    // Most faces around a cell are beside the segment, also if its end moves a little.
+    let is_low = a.max(b).max(c).cmplt(x.min(p));
+    let is_high = a.min(b).min(c).cmpgt(x.max(p));
+    if (is_low | is_high).any() {
+        return 0;
+    }
     let side = orientation(a, b, c, x);
     if side == 0 {
         return 0;

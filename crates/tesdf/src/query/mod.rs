@@ -46,6 +46,7 @@ mod nearest;
 mod polygon;
 mod ray;
 mod sign;
+#[cfg(feature = "collide")]
 mod surroundings;
 
 /// Constants that the kernels of `tesdf-gpu` share with this crate. Not part of the API.

@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use super::ON_SURFACE_F64;
-use super::locate::{Faces, Place};
+use super::locate::Place;
 use crate::TeSdf;
 use crate::asset::layout::{Label, SignHint, SignHints};
 use crate::base::Side;
@@ -149,9 +149,9 @@ impl TeSdf {
             Some((_, Label::Outside, _)) | None => return 0,
         };
         let corners = |f: u32| self.face_corners(f as usize).map(|p| self.frame.to_local(p));
-        let mut faces = Faces::default();
-        self.read_list(offset, &mut faces);
-        winding as i32
-            + faces.ids().iter().map(|&f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
+        let crossings = self.with_list(offset, |faces| {
+            faces.ids().iter().map(|&f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
+        });
+        winding as i32 + crossings
     }
 }

@@ -1,13 +1,15 @@
 //! The faces of a mesh near a group of polygons, found once for all of them.
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
+use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
 use super::kernel::{self, LANES};
-use super::polygon;
+use super::locate::{Faces, Place};
+use super::{Found, polygon};
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Closest};
 
 /// Up to this number of leaves of the face tree, polygons are compared with the box of each leaf.
 /// With more, a walk down the tree costs less.
@@ -24,7 +26,24 @@ pub(crate) struct Surroundings<'a> {
     limit: f64,
     /// `None` where there are too many.
     leaves: OnceCell<Option<Leaves>>,
+    answers: RefCell<Answers>,
 }
+
+/// Answers to points that several polygons of a group ask about: neighbours have their corners in
+/// common, and the points where they cross the faces of the mesh.
+#[derive(Debug, Default)]
+struct Answers {
+    /// In `f64`, with the range of the faces nearby.
+    exact: Vec<(DVec3, Found, Range<usize>)>,
+    near: Vec<(u32, Closest)>,
+    /// The faces near one point.
+    near_one: Vec<(u32, Closest)>,
+    /// In `f32`.
+    rough: Vec<(DVec3, Found)>,
+}
+
+/// Number of answers that are kept at a time. More would be searched for longer than they save.
+const KEPT: usize = 32;
 
 /// Leaves of a face tree.
 #[derive(Debug, Default)]
@@ -38,12 +57,56 @@ struct Leaves {
 impl<'a> Surroundings<'a> {
     /// Those of polygons within `bounds` that are compared with faces up to `limit` away.
     pub fn new(asset: &'a TeSdf, bounds: Aabb, limit: f64) -> Self {
-        Self { asset, bounds, limit, leaves: OnceCell::new() }
+        Self { asset, bounds, limit, leaves: OnceCell::new(), answers: RefCell::default() }
     }
 
     /// No group: the whole face tree is searched for every polygon.
     pub fn all(asset: &'a TeSdf) -> Self {
         Self::new(asset, Aabb::EMPTY, f64::NEG_INFINITY)
+    }
+
+    /// As [`TeSdf::found_exactly`].
+    pub fn found_exactly(&self, p: DVec3) -> Found {
+        let rough = &mut self.answers.borrow_mut().rough;
+        if let Some((_, found)) = rough.iter().find(|(at, _)| is_same(*at, p)) {
+            return *found;
+        }
+        let found = self.asset.found_exactly(p);
+        if rough.len() == KEPT {
+            rough.clear();
+        }
+        rough.push((p, found));
+        found
+    }
+
+    /// As [`TeSdf::found_at`] in `f64`, from the answers that are kept, if it is one of them.
+    pub fn found(&self, p: DVec3) -> Option<Found> {
+        self.answers.borrow().exact.iter().find(|(at, ..)| is_same(*at, p)).map(|(_, found, _)| *found)
+    }
+
+    /// The answer at a point in `f64`, and all faces that are within `tie` of the least distance, as
+    /// [`TeSdf::found_with_near`]. All calls have the same tie.
+    pub fn with_near<R>(&self, p: DVec3, tie: f64, then: impl FnOnce(Found, &[(u32, Closest)]) -> R) -> R {
+        let answers = &mut *self.answers.borrow_mut();
+        let kept = answers.exact.iter().position(|(at, ..)| is_same(*at, p));
+        let kept = kept.unwrap_or_else(|| {
+            let (place, near_one) = (self.asset.locate(p), &mut answers.near_one);
+            let mut found = |faces: &Faces| self.asset.found_with_near(p, place, faces, tie, near_one);
+            let found = match place {
+                Place::Listed { offset, .. } => self.asset.with_list(offset, found),
+                _ => found(&Faces::default()),
+            };
+            if answers.exact.len() == KEPT {
+                answers.exact.clear();
+                answers.near.clear();
+            }
+            let first = answers.near.len();
+            answers.near.extend_from_slice(&answers.near_one);
+            answers.exact.push((p, found, first..answers.near.len()));
+            answers.exact.len() - 1
+        });
+        let (_, found, near) = &answers.exact[kept];
+        then(*found, &answers.near[near.clone()])
     }
 
     /// Offers the faces that can come within a limit of a polygon of the group, those in nearer
@@ -118,6 +181,11 @@ impl<'a> Surroundings<'a> {
         }
         Some(leaves)
     }
+}
+
+/// Whether two points are equal bit by bit: so are then their answers.
+fn is_same(one: DVec3, other: DVec3) -> bool {
+    one.to_array().map(f64::to_bits) == other.to_array().map(f64::to_bits)
 }
 
 impl Leaves {

@@ -365,7 +365,8 @@ impl<'a> Query<'a> {
     fn only_touches(&self, cell: &CellField, distance: f64, point: DVec3) -> bool {
         let hair = self.tolerance.min(CLEAR);
         let is_free = |outward: DVec3| {
-            let moved: Vec<DVec3> = self.polygon.points().map(|p| p + hair * outward).collect();
+            let moved: ArrayVec<DVec3, MAX_VERTICES> =
+                self.polygon.points().map(|p| p + hair * outward).collect();
             let (polygon, center) = (&Polygon::new(&moved), self.center + hair * outward);
             let moved = Query { polygon, center, reach: hair, ..*self };
             let face = cell.value(center, Precision::F32).position;
@@ -374,8 +375,9 @@ impl<'a> Query<'a> {
         };
         // A normal that does not tell the outside may point either way.
         let is_either = || !self.asset.faces_look_outward() && is_free(self.normal);
-        distance <= hair
-            && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal) || is_either())
+        // The field of all cells keeps this value for the contact, which is there, too.
+        let gradient = || cell.opposing(point, DVec3::ZERO, Precision::F64).gradient;
+        distance <= hair && (is_free(gradient()) || is_free(-self.normal) || is_either())
     }
 
     /// Whether the whole polygon is farther than `limit` from the plane of a face. Decided in

@@ -337,7 +337,7 @@ impl<'a> Patch<'a> {
             // A cell is not searched for extremes.
             CellField::Mesh { .. } => {}
             CellField::Simple(simple) => {
-                for points in simple.parts().0 {
+                for points in simple.parts() {
                     match points[..] {
                         [a, b, c] => self.overlay(&Triangle::new([a, b, c]), f64::INFINITY, &mut offer),
                         // The feet of the ends of a capsule's core.
