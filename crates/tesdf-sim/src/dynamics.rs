@@ -1,6 +1,5 @@
 use std::time::Duration;
 
-use serde::Serialize;
 use tesdf::collide::{CollideError, Contact, HiddenOverlap};
 
 use crate::{Motor, State, System, Wrench};
@@ -100,7 +99,7 @@ pub struct StepReport {
 
 /// How far motion and forces are from those that the laws of contact, of joints and of momentum ask
 /// for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Residual {
     /// The greatest way of a contact, a joint or a point of a body in the step, m.
     pub way: f64,

@@ -33,8 +33,8 @@ pub struct Hit {
 }
 
 impl Newton {
-    /// The bodies that contacts in `found`, with these rows, let meet fast. `otherwise` are the velocities of the
-    /// others. `None` when there are none.
+    /// The bodies that contacts in `found`, with these rows, let meet fast. `otherwise` are the
+    /// velocities of the others. `None` when there are none.
     pub(super) fn hit(
         &mut self,
         step: &mut Step,

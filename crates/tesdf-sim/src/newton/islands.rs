@@ -15,9 +15,7 @@ pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
     let mut parent: Vec<usize> = (0..bodies).collect();
     for row in rows {
         if let [Some((a, _)), Some((b, _))] = row.sides {
-            let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-            // The root is the lowest body, so the result does not depend on the order of the rows.
-            parent[a.max(b)] = a.min(b);
+            join(&mut parent, a, b);
         }
     }
     let mut of_root: Vec<Option<usize>> = vec![None; bodies];
@@ -42,6 +40,13 @@ pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
         }
     }
     islands
+}
+
+/// Makes one group of those of `a` and `b`.
+pub fn join(parent: &mut [usize], a: usize, b: usize) {
+    let (a, b) = (root(parent, a), root(parent, b));
+    // The root is the lowest body, so the result does not depend on the order of the pairs.
+    parent[a.max(b)] = a.min(b);
 }
 
 /// The lowest body of the group that `k` belongs to.

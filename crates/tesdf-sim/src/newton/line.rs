@@ -60,9 +60,9 @@ pub struct Placed<'a> {
     pub resistance: Resistance,
 }
 
-/// Four rows of a group. Each has units in which a force of 1 changes its rate by 1 in the step: the
-/// gap is multiplied by `k = 1 / (h √w)` with `w = J M⁻¹ Jᵀ`, and the force divided by it. Both are
-/// then √J. Missing rows have no derivatives, no gap and no bounds, so nothing acts along them.
+/// Four rows of a group. Each has units in which a force of 1 changes its rate by 1 in the step:
+/// the gap is multiplied by `k = 1 / (h √w)` with `w = J M⁻¹ Jᵀ`, and the force divided by it.
+/// Both are then √J. Missing rows have no derivatives, no gap and no bounds, so nothing acts along them.
 #[derive(Clone, Debug)]
 pub struct Bundle {
     /// The numbers of its rows in the island; one to four.
@@ -296,14 +296,15 @@ impl Bundle {
         self.bounds.iter_mut().zip(row.bounds).for_each(|(to, bound)| to.0[lane] = bound / scale);
         self.scale.0[lane] = scale;
         if let (Some(slip), Some(friction)) = (&mut self.slip, &row.friction) {
-            let along = tangents(friction.normal).map(|t| {
+            let directions = tangents(friction.normal);
+            let along = directions.map(|t| {
                 let side =
                     |k: usize, sign: f64| Some((placed.bodies[k]?, sign * pack(t, row.arms[k].cross(t))));
                 [side(0, 1.0), side(1, -1.0)]
             });
             let of_slip = bodies.scale(along.iter().map(|sides| bodies.weight(sides)).sum::<f64>() / 2.0);
             slip.tangents.iter_mut().zip(along).for_each(|(to, side)| set(to, side[reference], of_slip));
-            let way = tangents(friction.normal).map(|t| of_slip * t.dot(friction.way));
+            let way = directions.map(|t| of_slip * t.dot(friction.way));
             slip.way.iter_mut().zip(way).for_each(|(to, way)| to.0[lane] = way);
             slip.coefficient.0[lane] = friction.coefficient * scale / of_slip;
             slip.scale.0[lane] = of_slip;

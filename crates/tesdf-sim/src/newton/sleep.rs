@@ -11,12 +11,12 @@
 //! motor, its wrench or its state is set to another value, when gravity is, and with what a joint
 //! connects it to.
 //!
-//! *What is kept.* Contacts of bodies that are still (fixed, asleep, or kinematic and without velocity)
-//! are detected once, when one of the two has become still, and reported in every step. They also say
+//! *What is kept.* Contacts of bodies that are still (fixed, asleep, or kinematic and without
+//! velocity) are detected once, when one of the two has become still, and reported in every step. They also say
 //! which bodies wake together.
 //!
-//! *What it depends on.* The time at rest follows from the states after each step and from what was set
-//! between steps, the rest from that and the states of the step. So a run that is continued gives the
+//! *What it depends on.* The time at rest follows from the states after each step and from what was
+//! set between steps, the rest from that and the states of the step. So a run that is continued gives the
 //! same bytes after [`Dynamics::recall`](crate::Dynamics::recall).
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -25,12 +25,12 @@ use tesdf::collide::{
     CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, InstanceId, Pose, instance_pairs,
 };
 
-use super::islands::root;
+use super::islands::{join, root};
 use super::{Newton, NewtonOptions};
 use crate::{DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
-/// A body is at rest as long as no point of it has left its place by more than this, m, or its velocity
-/// would take it that far in a step. The solver moves bodies at rest by 0.1 nm a step at most, and by
+/// A body is at rest as long as no point of it has left its place by more than this, m, or its
+/// velocity would take it that far in a step. The solver moves bodies at rest by 0.1 nm a step at most, and by
 /// a few pm in a second where there is no friction.
 const STAYS: f64 = 1e-9;
 
@@ -303,10 +303,7 @@ impl Newton {
         let mut parent: Vec<usize> = (0..rests.len()).collect();
         for [a, b] in touching.iter().copied().chain(joined(system)) {
             match [a, b].map(|body| is_free(system, body)) {
-                [true, true] => {
-                    let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-                    parent[a.max(b)] = a.min(b);
-                }
+                [true, true] => join(&mut parent, a, b),
                 // What a kinematic body moves is not at rest, although it may stay where it is.
                 [true, false] => rests[a] &= sleep.still[b],
                 [false, true] => rests[b] &= sleep.still[a],

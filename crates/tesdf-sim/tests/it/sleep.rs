@@ -124,7 +124,8 @@ fn a_stack_at_rest_falls_asleep_and_stays_bit_for_bit() {
     two.agree(100);
     assert_eq!(two.states(), before);
     assert!(before.iter().all(|state| *state == State::at_rest(state.pose)));
-    // Its contacts are still told. Where edges are flush, rounding decides which parts of a pair touch.
+    // Its contacts are still told. Where edges are flush, rounding decides which parts of a pair
+    // touch.
     let [asleep, awake] = two.0.each_ref().map(|engine| {
         let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
         let mut pairs: Vec<_> = engine.contacts().iter().map(ids).collect();
