@@ -32,13 +32,18 @@ pub trait Dynamics {
     /// Takes over the states after a step of `time_step` seconds that was made before, without making
     /// it. An engine that remembers more than the states of its bodies follows a run that it continues
     /// this way: first the states at the beginning, without a time step, then those after each step,
-    /// with what was set before it. Returns false, and does nothing, when its steps depend on states
-    /// alone.
+    /// with what was set before it. It may ignore them when its steps depend on states alone.
     ///
     /// # Errors
     /// As [`System::set_states`].
-    fn recall(&mut self, _states: Vec<State>, _time_step: Option<f64>) -> Result<bool, DynamicsError> {
-        Ok(false)
+    fn recall(&mut self, _states: Vec<State>, _time_step: Option<f64>) -> Result<(), DynamicsError> {
+        Ok(())
+    }
+
+    /// After a number of steps that is a multiple of this, a step depends on what was
+    /// [recalled](Self::recall) alone. Whoever continues a run makes the steps since then again.
+    fn remembers(&self) -> u64 {
+        1
     }
 
     /// Advances all bodies by `time_step` seconds.

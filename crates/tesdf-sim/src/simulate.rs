@@ -245,17 +245,26 @@ impl Run {
         })
     }
 
-    /// Lets `engine` recall the steps so far.
+    /// Lets `engine` recall the steps so far, and make the last ones again.
     fn recall(&self, engine: &mut dyn Dynamics) -> Result<(), SimulateError> {
         let (steps, h) = (self.record.steps(), self.time_step);
+        let recalled = steps - steps % engine.remembers().max(1);
         for step in 0..=steps {
             let failed = |source| SimulateError::Step { step, source };
             if let Some(before) = step.checked_sub(1) {
                 self.scripts.drive(engine, before as f64 * h, h).map_err(failed)?;
             }
             let states = self.record.states(step as usize).unwrap_or_default();
-            if steps == 0 || !engine.recall(states, (step > 0).then_some(h)).map_err(failed)? {
-                break;
+            if step <= recalled {
+                engine.recall(states, (step > 0).then_some(h)).map_err(failed)?;
+                continue;
+            }
+            engine.step(h).map_err(failed)?;
+            // Another version of the program may have made the record.
+            for (body, state) in states.into_iter().enumerate() {
+                if engine.system().states().get(body) != Some(&state) {
+                    engine.set_state(body, state).map_err(failed)?;
+                }
             }
         }
         Ok(())

@@ -17,6 +17,7 @@ use super::geometric::{Loads, Motion, Start};
 use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
+use super::kept::{FORGETS, Kept};
 use super::line::Placed;
 use super::look::Look;
 use super::passing::Passing;
@@ -67,6 +68,7 @@ pub struct Newton {
     /// What the last step found at its beginning.
     found: Contacts,
     pub(super) sleep: Sleep,
+    pub(super) kept: Kept,
 }
 
 /// The velocities of the free bodies that move the poses, and those that the next step starts from.
@@ -83,6 +85,10 @@ const MOST_PARTS: f64 = 1000.0;
 
 /// Bodies are wild when they are faster than what moves them by this factor.
 const WILD: f64 = 10.0;
+
+/// Fewer rows are solved on the calling thread: that a thread of the pool wakes takes as long as some
+/// hundred rows.
+const ON_ONE_THREAD: usize = 500;
 
 /// Of the times of parts.
 const ROUNDING: f64 = 1e-9;
@@ -143,8 +149,8 @@ impl Newton {
         let sizes = diagonals.collect::<Result<_, CollideError>>()?;
         let (detector, found) = (Box::new(detector), Contacts::default());
         let surfaces = Surfaces::new(system.scene(), collide.mode);
-        let sleep = Sleep::new(system.states());
-        Ok(Self { system, detector, collide, options, sizes, surfaces, found, sleep })
+        let (sleep, kept) = (Sleep::new(system.states()), Kept::default());
+        Ok(Self { system, detector, collide, options, sizes, surfaces, found, sleep, kept })
     }
 
     /// Sets gravity, m/s², from now on. All bodies wake.
@@ -286,7 +292,10 @@ impl Newton {
         let minimum = |island: &Island| self.solve_island(step, motion, island, rows, gap, guess);
         // One thread computes each minimum, and they are collected in order: the bits do not depend
         // on the number of threads.
-        let minima: Vec<Minimum> = islands.par_iter().map(minimum).collect();
+        let minima: Vec<Minimum> = match islands.len() > 1 && rows.len() >= ON_ONE_THREAD {
+            true => islands.par_iter().map(minimum).collect(),
+            false => islands.iter().map(minimum).collect(),
+        };
         let (mut velocities, mut forces) = (motion.target.clone(), vec![RowForce::default(); rows.len()]);
         let report = &mut step.report;
         report.islands = islands.len();
@@ -337,6 +346,8 @@ impl Newton {
         let placed: Vec<_> = island.rows.iter().map(placed).collect();
         let of_rows = |forces: &[RowForce]| island.rows.iter().map(|&k| forces[k]).collect::<Vec<_>>();
         let (start, forces) = (of(guess.velocities), guess.forces.map(of_rows));
+        // Where nothing touched before, nothing is known.
+        let forces = forces.filter(|forces| forces.iter().any(|force| force.along != 0.0));
         let asked = placed.iter().map(|placed| placed.gap.abs() / step.h).fold(0.0, f64::max);
         let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
         let minimum = problem.minimise(start.clone(), forces.as_deref());
@@ -604,8 +615,9 @@ impl Newton {
         let mut later: Option<Vec<Row>> = None;
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut plain = Motion::new(&step.free, &step.target);
-        let (mut velocities, mut forces) =
-            self.solve(step, &plain, &first, Gap::Position, Guess { velocities: &start, forces: None });
+        let kept = self.kept.of(&first);
+        let guess = Guess { velocities: &start, forces: kept.as_deref() };
+        let (mut velocities, mut forces) = self.solve(step, &plain, &first, Gap::Position, guess);
         let count = step.free.len();
         let loads =
             |rows: &[Row], forces: &[RowForce]| Loads::new(count, rows, forces, rows.len() - joints.len());
@@ -652,7 +664,7 @@ impl Newton {
                 predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
                 if let Some(hit) = hit {
                     let motion = stiffened.as_ref().unwrap_or(&plain);
-                    let guess = carry(later.as_ref().unwrap_or(&first), &forces, &next);
+                    let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
                     let (_, forces) =
                         self.solve(step, motion, &next, Gap::Position, from_last(&velocities, &guess));
                     held = hit.held(&next, &forces, stays);
@@ -662,7 +674,7 @@ impl Newton {
                 found_at.clone_from(&velocities);
                 let last = later.as_ref().unwrap_or(&first);
                 stiffened = plain.stiffened(&loads(last, &forces), &found_at, &from);
-                let guess = carry(last, &forces, &next);
+                let guess = carry_rows(last, &forces, &next);
                 let rows = &*later.insert(next);
                 let motion = stiffened.as_ref().unwrap_or(&plain);
                 let before = velocities;
@@ -682,10 +694,16 @@ impl Newton {
             true => self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)).0,
             false => velocities.clone(),
         };
-        let Iterate { velocities, plain, .. } = solved;
+        let Iterate { rows, velocities, forces, plain, .. } = solved;
+        self.kept.keep(&rows, forces);
         let carried = step.ended(&plain, &velocities, &carried);
         Ok([velocities, carried])
     }
+}
+
+/// The forces of the rows `before` for `rows`.
+fn carry_rows(before: &[Row], forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
+    carry(before.iter().map(|row| row.id), forces, rows)
 }
 
 /// A minimisation that starts from the last one.
@@ -717,8 +735,16 @@ impl Dynamics for Newton {
         self.set_wrench_awake(body, wrench)
     }
 
-    fn recall(&mut self, states: Vec<State>, time_step: Option<f64>) -> Result<bool, DynamicsError> {
+    fn recall(&mut self, states: Vec<State>, time_step: Option<f64>) -> Result<(), DynamicsError> {
+        match time_step {
+            Some(_) => self.kept.end(),
+            None => self.kept.restart(),
+        }
         self.recall_states(states, time_step)
+    }
+
+    fn remembers(&self) -> u64 {
+        FORGETS
     }
 
     fn step(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {
@@ -727,12 +753,17 @@ impl Dynamics for Newton {
             return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
         }
         let states = self.system.states().to_vec();
+        self.kept.begin();
         let made = self.in_parts(time_step);
         self.unmark();
-        made.or_else(|error| {
-            self.system.set_states(states)?;
-            Err(error)
-        })
+        match &made {
+            Ok(_) => self.kept.end(),
+            Err(_) => {
+                self.kept.forget();
+                self.system.set_states(states)?;
+            }
+        }
+        made
     }
 
     fn contacts(&self) -> &[Contact] {

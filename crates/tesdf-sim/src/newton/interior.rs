@@ -87,8 +87,8 @@ struct Effort {
     width: usize,
 }
 
-/// From forces that are nearly right.
-const WARM: Effort = Effort { iterations: 14, short_steps: 2, width: 1 };
+/// From forces that may be nearly right.
+const WARM: Effort = Effort { iterations: 24, short_steps: 2, width: 1 };
 /// From no forces.
 const COLD: Effort = Effort { iterations: 30, short_steps: 3, width: 0 };
 /// The same without friction: convex, so short steps pass.
@@ -110,8 +110,6 @@ const CORRECTED_FROM: f64 = 1e-6;
 const FIRST_WARM: f64 = 10.0;
 /// The least gap as which they may be off, m.
 const LEAST_WARM: f64 = 1e-9;
-/// Forces are nearly right when they are off by less, m.
-const NEARLY: f64 = 1e-3;
 
 /// The least `a`, m: that with which the method converges, and that of the solution. The way by
 /// which a contact creeps in a step before it sticks.
@@ -135,7 +133,7 @@ impl Interior<'_> {
 
     fn iterate(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Forces>)>) -> Solution {
         let mut iterations = 0;
-        if let Some((velocity, forces)) = guess.filter(|(v, forces)| self.residual(v, forces).way < NEARLY) {
+        if let Some((velocity, forces)) = guess {
             let centre = self.centre_of(&velocity, &forces);
             let found = Iterate::from(self, velocity, &forces, centre).descend(Limits::Coulomb, WARM);
             iterations += found.iterations;
@@ -273,7 +271,7 @@ impl Interior<'_> {
                 let (bundle, forces) = (&self.lines.bundles[k], &forces[k]);
                 bundle.act(forces.push, forces.friction, &mut acting);
                 // A force is right when a spring that keeps it finds it again.
-                let again = forces.push - bundle.at(&relative);
+                let again = forces.push - bundle.left(&relative, forces.push);
                 for lane in 0..bundle.rows().len() {
                     let [low, high] = bundle.bounds.map(|bound| bound.0[lane]);
                     let off = again.0[lane].max(low).min(high) - forces.push.0[lane];
@@ -289,17 +287,25 @@ impl Interior<'_> {
         }
     }
 
-    /// ν for velocities and forces that are nearly right.
+    /// ν for velocities and forces that are nearly right: that of the gaps that are left where a
+    /// force is within its bounds, and of the ways by which forces are off.
     fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> f64 {
-        let (mut products, mut count) = (0.0, 0.0);
+        let (mut products, mut count, mut worst) = (0.0, 0.0, LEAST_WARM);
         for (k, bundle, relative) in self.bundles(velocity) {
-            let product = bundle.at(&relative) * forces[k].push;
+            let push = forces[k].push;
+            let gap = bundle.left(&relative, push);
             for lane in (0..bundle.rows().len()).filter(|&lane| bundle.count_bounds(lane) > 0) {
-                products += product.0[lane].abs();
+                let [low, high] = bundle.bounds.map(|bound| bound.0[lane]);
+                let (gap, push) = (gap.0[lane], push.0[lane]);
+                let is_low = high == f64::INFINITY || gap > 0.0 && low > f64::NEG_INFINITY;
+                let room = if is_low { push - low } else { high - push };
+                products += (gap * room).abs();
                 count += 1.0;
+                let off = (push - gap).max(low).min(high) - push;
+                worst = f64::max(worst, off.abs() / bundle.scale.0[lane]);
             }
         }
-        FIRST_WARM * f64::max(products / f64::max(count, 1.0), self.mean_square(LEAST_WARM))
+        FIRST_WARM * f64::max(products / f64::max(count, 1.0), self.mean_square(worst))
     }
 }
 

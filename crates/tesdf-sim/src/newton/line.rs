@@ -328,6 +328,12 @@ impl Bundle {
         self.gap + dot(&self.normal, relative)
     }
 
+    /// The gaps that these forces leave.
+    #[inline(always)]
+    pub fn left(&self, relative: &[f64; 6], push: Lanes) -> Lanes {
+        self.at(relative) + self.compliance * push
+    }
+
     /// How far the gaps are from ones that need no force.
     pub fn violation(&self, relative: &[f64; 6]) -> f64 {
         let gap = self.at(relative);

@@ -34,6 +34,7 @@ mod integrate;
 mod interior;
 mod islands;
 mod joints;
+mod kept;
 mod lanes;
 mod line;
 mod linear;

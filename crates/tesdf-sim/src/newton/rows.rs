@@ -201,17 +201,18 @@ pub struct Bodies<'a> {
     pub free_of: &'a [Option<usize>],
 }
 
-/// The forces of the rows `before` for rows of the same ids, in the order in which these come.
-pub fn carry(before: &[Row], forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
-    let ordered = |rows: &[Row]| {
-        let mut order: Vec<(RowId, usize)> = rows.iter().map(|row| row.id).zip(0..).collect();
+/// The forces of rows whose ids are `before`, for rows of the same ids, in the order in which these
+/// come.
+pub fn carry(before: impl Iterator<Item = RowId>, forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
+    fn ordered(ids: impl Iterator<Item = RowId>) -> Vec<(RowId, usize)> {
+        let mut order: Vec<_> = ids.zip(0..).collect();
         order.sort_unstable();
         order
-    };
+    }
     let mut carried = vec![RowForce::default(); rows.len()];
     let before = ordered(before);
     let mut from = before.iter().peekable();
-    for (id, k) in ordered(rows) {
+    for (id, k) in ordered(rows.iter().map(|row| row.id)) {
         while from.next_if(|(other, _)| *other < id).is_some() {}
         if let Some((_, other)) = from.next_if(|(other, _)| *other == id) {
             carried[k] = forces[*other];

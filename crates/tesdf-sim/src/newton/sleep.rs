@@ -386,16 +386,13 @@ impl Newton {
         &mut self,
         states: Vec<State>,
         time_step: Option<f64>,
-    ) -> Result<bool, DynamicsError> {
-        if !self.sleeps() {
-            return Ok(false);
-        }
+    ) -> Result<(), DynamicsError> {
         self.system.set_states(states)?;
         match time_step {
             Some(h) => self.sleep.count(self.system.states(), &self.sizes, h, self.options.sleep),
             None => self.sleep = Sleep::new(self.system.states()),
         }
-        Ok(true)
+        Ok(())
     }
 }
 

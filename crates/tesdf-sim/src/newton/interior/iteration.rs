@@ -31,6 +31,9 @@ const SHORTER: f64 = 0.01;
 /// Steps below are short, and above long.
 const SHORT: f64 = 0.3;
 const LONG: f64 = 0.7;
+/// The place between two bounds is found in so many rounds: exactly where ν is small, and near enough
+/// to begin with where it is great.
+const ROUNDS: u32 = 20;
 /// Gondzio's correction is taken where it lengthens the step by this factor.
 const LENGTHENS: f64 = 1.05;
 
@@ -108,8 +111,8 @@ fn on_path(gap: f64, centre: f64) -> [f64; 2] {
     [slack, centre / slack]
 }
 
-/// Force, room and slack of a row at the gap `gap` with this ν. A row without bounds keeps its
-/// force.
+/// Force, room and slack of a row with this ν. Without bounds, `-gap` would be the force. A row
+/// without bounds keeps its force.
 fn on_path_between([low, high]: [f64; 2], gap: f64, centre: f64, kept: f64) -> (f64, [f64; 2], [f64; 2]) {
     match (low.is_finite(), high.is_finite()) {
         (true, false) => {
@@ -121,14 +124,16 @@ fn on_path_between([low, high]: [f64; 2], gap: f64, centre: f64, kept: f64) -> (
             (high - room, [f64::INFINITY, room], [0.0, slack])
         }
         (true, true) => {
-            // ν / (half + x) − ν / (half − x) = gap
-            let half = 0.5 * (high - low);
-            let root = centre + (centre * centre + (gap * half).powi(2)).sqrt();
-            let x = -gap * half * half / root;
-            // (half − |x|) (half + |x|) = 2 ν |x| / |gap|
-            let near = 2.0 * centre * half * half / root / (half + x.abs());
-            let room = if x < 0.0 { [near, half - x] } else { [half + x, near] };
-            (0.5 * (low + high) + x, room, room.map(|room| centre / room))
+            // The room at the nearer bound, with the slack that the other bound adds.
+            let (half, middle) = (0.5 * (high - low), 0.5 * (low + high));
+            let (beyond, mut near) = ((middle + gap).abs() - half, half);
+            for _ in 0..ROUNDS {
+                near = on_path(beyond + centre / (2.0 * half - near), centre)[1].min(half);
+            }
+            let far = 2.0 * half - near;
+            let (force, room) =
+                if middle + gap > 0.0 { (low + near, [near, far]) } else { (high - near, [far, near]) };
+            (force, room, room.map(|room| centre / room))
         }
         (false, false) => (kept, [f64::INFINITY; 2], [0.0; 2]),
     }
@@ -136,13 +141,12 @@ fn on_path_between([low, high]: [f64; 2], gap: f64, centre: f64, kept: f64) -> (
 
 impl State {
     fn new(bundle: &Bundle, relative: &[f64; 6], centre: f64, kept: &Forces) -> Self {
-        let gap = bundle.at(relative);
+        // The force comes out again where it leaves no gap.
+        let gap = bundle.left(relative, kept.push) - kept.push;
         let (mut force, mut room, mut slack) = (Lanes::ZERO, [Lanes::ZERO; 2], [Lanes::ZERO; 2]);
         for lane in 0..WIDTH {
             let (bounds, push) = (bundle.bounds.map(|bound| bound.0[lane]), kept.push.0[lane]);
-            // Where only one bound is near, so that the force comes out again.
-            let of_force = if bundle.count_bounds(lane) == 2 { 0.0 } else { push };
-            let found = on_path_between(bounds, gap.0[lane] - of_force, centre, push);
+            let found = on_path_between(bounds, gap.0[lane], centre, push);
             force.0[lane] = found.0;
             for k in [0, 1] {
                 (room[k].0[lane], slack[k].0[lane]) = (found.1[k], found.2[k]);
