@@ -9,9 +9,8 @@ use crate::newton::linear::{BlockMatrix, Factor};
 
 /// Lagged limits stay once the root of ν is below this gap, m.
 const FREEZE: f64 = 1e-5;
-/// An iterate is the solution when the last iteration moved no body by more than this, and leaves no
-/// more of a gap, m.
-const SETTLED: f64 = 1e-10;
+/// An iterate is the solution when the last iteration leaves no more of a gap, m.
+const CLOSED: f64 = 1e-10;
 /// With friction, the forces are off by less than this way, and this share of the way without rows.
 const BALANCED: [f64; 2] = [1e-8, 1e-6];
 /// ν ends at the square of this gap, m, ...
@@ -516,7 +515,12 @@ impl<'a> Iterate<'a> {
             short_steps = if step < SHORT { short_steps + 1 } else { 0 };
             let open = || self.open() * (1.0 - step);
             let is_balanced = || !is_coulomb || self.of.way_of_momentum(&momentum) < balanced;
-            if step > LONG && way < SETTLED && open() < SETTLED && is_balanced() && self.product() <= few {
+            if step > LONG
+                && way < effort.settled
+                && open() < CLOSED
+                && is_balanced()
+                && self.product() <= few
+            {
                 if !has_friction || width + 1 == WIDTHS.len() {
                     return self.solution(&limits, true);
                 }
