@@ -64,7 +64,7 @@ fuzz_target!(|data: &[u8]| {
         let shape = scene.add_shape(body.asset.clone()).expect("room");
         scene.add(Instance::new(shape, at)).expect("a valid pose");
     }
-    for mode in [Mode::Node, Mode::Edge, CollideOptions::default().mode] {
+    for mode in [Mode::Node, CollideOptions::default().mode] {
         let found =
             detect(&scene, &CollideOptions { mode, ..CollideOptions::default() }).expect("valid options");
         for contact in &found {

@@ -67,8 +67,7 @@ impl Keywords {
     }
 }
 
-const MODES: [(&str, Mode); 4] =
-    [("node", Mode::Node), ("edge", Mode::Edge), ("face", Mode::Face), ("exact", Mode::Exact)];
+const MODES: [(&str, Mode); 3] = [("node", Mode::Node), ("face", Mode::Face), ("exact", Mode::Exact)];
 
 const CONTACTS_PER: [(&str, ContactsPer); 3] =
     [("cell", ContactsPer::Cell), ("face", ContactsPer::Face), ("minimum", ContactsPer::Minimum)];

@@ -258,9 +258,8 @@ impl Scene {
     /// bytes do not depend on the number of threads. Ctrl-C ends a detection with
     /// KeyboardInterrupt.
     ///
-    /// - mode: what is tested of a: "node" (its vertices), "edge" (vertices and convex edges),
-    ///   "face" (faces, by Frank-Wolfe iterations, as in the paper) or "exact" (faces, with the
-    ///   exact minimum).
+    /// - mode: what is tested of a: "node" (its vertices), "face" (faces, by Frank-Wolfe
+    ///   iterations, as in the paper) or "exact" (faces, with the exact minimum).
     /// - contacts_per: in the modes "face" and "exact", one contact for each "cell" of b that a
     ///   face meets, as in the paper; or for each "face", with the extremes of flat contact; or of
     ///   these only each local "minimum" over the surface.
@@ -269,8 +268,8 @@ impl Scene {
     /// - cos_theta: drops a contact of a face when the cosine between the gradient and the face's
     ///   normal is above -cos_theta. None keeps all.
     /// - iterations: number of Frank-Wolfe iterations in the mode "face".
-    /// - tolerance: largest error in the modes "exact" and "edge", in the world's unit. None is
-    ///   1e-7 of the diagonal of b.
+    /// - tolerance: largest error in the mode "exact", in the world's unit. None is 1e-7 of the
+    ///   diagonal of b.
     /// - reduce, deepest, spread: at most this many contacts for each pair of instances; only one
     ///   of them. reduce finds all contacts and keeps those that matter most for forces and
     ///   torques. deepest finds only the deepest. spread finds contacts that are spread over the
@@ -279,9 +278,8 @@ impl Scene {
     /// - threads: number of threads; None is one per core.
     /// - device: "cpu", "gpu" (what TESDF_DEVICE names, else the best device), or the number of a
     ///   device or a part of its name, such as "cuda:0"; devices lists them. A device computes in
-    ///   f32 and has no mode "edge"; docs/gpu/design.md says how far its contacts agree with the
-    ///   processor's. It keeps the shapes until a detection on another device. Ctrl-C acts after
-    ///   the detection.
+    ///   f32; docs/gpu/design.md says how far its contacts agree with the processor's. It keeps
+    ///   the shapes until a detection on another device. Ctrl-C acts after the detection.
     #[pyo3(signature = (*, device = None, **options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None, device='cpu')")]
     fn detect<'py>(
         &self,
@@ -468,10 +466,9 @@ impl Scene {
     }
 
     /// Why contacts of two instances exist or not: what each stage of a detection did with the
-    /// faces of a (in the mode "node" its vertices, in the mode "edge" its vertices and edges) in
-    /// the field of b. Returns a WhyReport.
+    /// faces of a (in the mode "node" its vertices) in the field of b. Returns a WhyReport.
     ///
-    /// part: the face, vertex or edge of a (as face_a or feature_a of a contact). None reports all
+    /// part: the face or vertex of a (as face_a or feature_a of a contact). None reports all
     /// candidates. The options are those of detect; the report is that before a reduction.
     #[pyo3(signature = (a, b, part = None, **options), text_signature = "($self, a, b, part=None, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
     fn why<'py>(

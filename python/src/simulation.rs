@@ -32,7 +32,7 @@ use crate::{classes, pool};
 ///
 /// - scene: path of a TOML file, or a dict with the keys of such a file. Paths in a dict are
 ///   relative to the current folder, and arrays may be those of numpy.
-/// - mode: replaces the mode of the scene's detector: "node", "edge", "face", "exact" or "off".
+/// - mode: replaces the mode of the scene's detector: "node", "face", "exact" or "off".
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
 /// - device: where contacts are found, as in Scene.detect.
@@ -80,9 +80,8 @@ impl Source {
     }
 }
 
-const MODES: [(&str, DetectorMode); 5] = [
+const MODES: [(&str, DetectorMode); 4] = [
     ("node", DetectorMode::Node),
-    ("edge", DetectorMode::Edge),
     ("face", DetectorMode::Face),
     ("exact", DetectorMode::Exact),
     ("off", DetectorMode::Off),

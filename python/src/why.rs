@@ -63,7 +63,6 @@ impl<'a> From<&'a PolygonReport> for Polygon<'a> {
             PolygonVerdict::Filtered { cosine } => ("filtered", Some(cosine)),
             PolygonVerdict::Descending => ("descending", None),
             PolygonVerdict::OutOfCones => ("out_of_cones", None),
-            PolygonVerdict::AtEnd => ("at_end", None),
         };
         let PolygonReport { cell, distance, point, face_b, .. } = *polygon;
         Self { cell, vertices: &polygon.vertices, distance, point, face_b, verdict, cosine }

@@ -19,7 +19,7 @@ Shape = Union["_native.Asset", Plane, Box, Sphere, Capsule]
 class WhyOptions(TypedDict, total=False):
     """Keywords of `Scene.detect` on the processor, which explains them."""
 
-    mode: Literal["node", "edge", "face", "exact"]
+    mode: Literal["node", "face", "exact"]
     contacts_per: Literal["cell", "face", "minimum"]
     contact_distance: float
     speculative_time: float

@@ -199,7 +199,7 @@ class ContactPatches(_Rows):
 class ContactRows(_Rows):
     """Arrays with a row for each contact.
 
-    In each contact, *a* is the body that has the face, edge or vertex, and *b* is the body whose
+    In each contact, *a* is the body that has the face or vertex, and *b* is the body whose
     signed distance field is used. Faces are numbered as in the source mesh, from 0.
     """
 
@@ -212,7 +212,7 @@ class ContactRows(_Rows):
     distance: _Float
     """[N] signed distance of b at `point_a`; negative where the bodies overlap"""
     face_a: _Id
-    """[N] face of a; of a vertex or edge, the lowest face that has it"""
+    """[N] face of a; of a vertex, the lowest face that has it"""
     face_b: _Id
     """[N] the face of b that is closest to `point_a`"""
     tet_b: _Id
@@ -223,16 +223,14 @@ class ContactRows(_Rows):
     instance_b: _Id
     """[N] the body whose field is used"""
     feature_a: _Id
-    """[N] face of a; in the mode "node", vertex of a; in the mode "edge", a vertex, or for an edge
-    the number of vertices + 3 * face + side"""
+    """[N] face of a; in the mode "node", vertex of a"""
     feature_b_kind: npt.NDArray[np.uint8]
     """[N] the closest feature of b: 0 for a vertex, 1 for an edge, 2 for a face"""
     feature_b: _Id
     """[N, 2] the vertex or face in the first column, or the two vertices of the edge, the lower id
     first; the unused number is 2^32 - 1"""
     converged: npt.NDArray[np.bool_]
-    """[N] whether it is proved that no point of the face or edge is deeper by more than the
-    tolerance"""
+    """[N] whether it is proved that no point of the face is deeper by more than the tolerance"""
 
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """The arrays with a row for each contact, by name, as for `numpy.savez`."""
@@ -251,7 +249,7 @@ class Contacts(ContactRows):
     """for each pair of instances; without rows if nothing is reduced"""
     hidden: HiddenOverlaps
     """pairs that overlap without a contact that shows it; contacts will not keep them apart. This
-    happens in the modes "node" and "edge", and for bodies in the same pose"""
+    happens in the mode "node", and for bodies in the same pose"""
 
     def __repr__(self) -> str:
         overlaps = f", {len(self.hidden)} hidden overlaps" if len(self.hidden) else ""

@@ -378,8 +378,8 @@ class DetectionStatistics:
     instance_pairs: int
     """ordered pairs of instances whose bounds overlap"""
     candidates: int
-    """faces, edges or vertices that remain after the broad phase; with `deepest` and `spread`, this
-    and all other numbers count what was looked at"""
+    """faces or vertices that remain after the broad phase; with `deepest` and `spread`, this and all
+    other numbers count what was looked at"""
     polygons: int
     """pairs of a face and a cell, or of a vertex and its cell; with one contact per face, faces"""
     touching: int
@@ -473,15 +473,14 @@ class WhyPolygon:
     face_b: int
     verdict: str
     """"contact"; or why it is none: "cell_beyond" and "beyond" the contact distance, "filtered" by
-    the cosine, "descending" or "out_of_cones" where local minima are wanted, or "at_end" of an
-    edge, which is tested as a vertex"""
+    the cosine, "descending" or "out_of_cones" where local minima are wanted"""
     cosine: Optional[float]
     """of a filtered contact"""
 
 
 @dataclass(frozen=True)
 class WhyPart:
-    """A face, vertex or edge of a."""
+    """A face or vertex of a."""
 
     id: int
     contact_distance: float
@@ -510,7 +509,7 @@ class WhyReport:
     bounds_gap: float
     """distance between the bounds; 0 when they overlap"""
     total: int
-    """number of faces, vertices or edges of a"""
+    """number of faces or vertices of a"""
     candidates: int
     """number of these that the broad phase keeps"""
     parts: tuple[WhyPart, ...]

@@ -52,7 +52,6 @@ def same(found, expected):
 OPTIONS = [
     {},
     {"mode": "node"},
-    {"mode": "edge", "contact_distance": 0.02},
     {"mode": "face", "contacts_per": "cell", "iterations": 16, "cos_theta": 0.5},
     {"contacts_per": "minimum", "contact_distance": 0.05, "tolerance": 1e-6},
     {"contact_distance": 0.05, "reduce": 5},
@@ -110,7 +109,7 @@ def test_measures_are_those_of_the_command(asset, file):
     assert distances == [[p["distance"] for p in part["polygons"]] for part in expected["parts"]]
 
 
-@pytest.mark.parametrize("mode", ["node", "edge", "face", "exact"])
+@pytest.mark.parametrize("mode", ["node", "face", "exact"])
 def test_contacts_have_the_signed_distance_of_the_field(asset, torus, mode):
     # Body a is where its mesh is, so its field can be asked at points of the world.
     found = tesdf.collide(asset, asset, pose_b=LINKED, mode=mode, contact_distance=0.03, tolerance=1e-9)
@@ -290,7 +289,7 @@ def test_why_agrees_with_the_contacts(asset):
 
 
 @pytest.mark.parametrize("options, error, text", [
-    ({"mode": "nodes"}, ValueError, "mode: 'nodes'; expected 'node', 'edge', 'face' or 'exact'"),
+    ({"mode": "nodes"}, ValueError, "mode: 'nodes'; expected 'node', 'face' or 'exact'"),
     ({"mode": 3}, ValueError, "mode: int; expected 'node'"),
     ({"contacts_per": "vertex"}, ValueError, "contacts_per: 'vertex'; expected 'cell', 'face' or 'minimum'"),
     ({"precision": "f16"}, ValueError, "precision: 'f16'; expected 'f64' or 'f32'"),

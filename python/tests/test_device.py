@@ -106,8 +106,6 @@ def test_a_detector_follows_the_scene(linked, asset):
 
 
 def test_what_a_device_cannot_do(linked):
-    with pytest.raises(tesdf.DeviceError, match="the mode `edge` is not available on a device; use the mode `exact`"):
-        linked.detect(mode="edge", device="wgpu:0")
     with pytest.raises(tesdf.CollideError, match="contact_distance is -1e0"):
         linked.detect(contact_distance=-1.0, device="wgpu:0")
     with pytest.raises(TypeError, match="why.. has no keyword 'device'"):

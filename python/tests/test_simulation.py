@@ -105,7 +105,7 @@ def test_options(scene):
 def test_errors(scene, tmp_path):
     with pytest.raises(FileNotFoundError, match="none.toml"):
         tesdf.Simulation(tmp_path / "none.toml")
-    with pytest.raises(ValueError, match="mode: 'nodes'; expected 'node', 'edge', 'face', 'exact' or 'off'"):
+    with pytest.raises(ValueError, match="mode: 'nodes'; expected 'node', 'face', 'exact' or 'off'"):
         tesdf.Simulation(scene, mode="nodes")
     with pytest.raises(tesdf.SimulationError, match="duration.*-1; expected a number of seconds above 0"):
         tesdf.Simulation(scene, duration=-1)

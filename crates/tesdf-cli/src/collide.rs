@@ -58,8 +58,6 @@ impl Bodies {
 pub enum ModeName {
     /// The vertices
     Node,
-    /// The vertices and the edges, with the exact minimum
-    Edge,
     /// The faces, by Frank-Wolfe iterations
     Face,
     /// The faces, with the exact minimum
@@ -90,7 +88,7 @@ pub struct Args {
     /// Number of Frank-Wolfe iterations in the mode `face`
     #[arg(long, value_name = "K", default_value_t = 16)]
     pub iterations: u32,
-    /// Maximum error in the modes `exact` and `edge`, in the meshes' unit [default: 1e-7 of the
+    /// Maximum error in the mode `exact`, in the meshes' unit [default: 1e-7 of the
     /// diagonal of the body with the field]
     #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
@@ -108,8 +106,8 @@ pub struct Args {
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = device::help("contacts are found"))]
     pub device: Choice,
     /// Print why contacts exist or not instead: what each stage did with all candidates, or with
-    /// one face (in the mode `node`, one vertex; in the mode `edge`, one vertex or edge) of
-    /// instance 0, or of either instance as INSTANCE:FACE
+    /// one face (in the mode `node`, one vertex) of instance 0, or of either instance as
+    /// INSTANCE:FACE
     #[arg(long, value_name = "FACE", value_parser = parse::part, num_args = 0..=1)]
     pub why: Option<Option<(u32, u32)>>,
     /// Print the contacts as a JSON array; with --why, print the reports
@@ -158,7 +156,6 @@ impl Args {
         let tolerance = self.tolerance.map_or(Length::OfDiagonal(1e-7), Length::Absolute);
         let mode = match self.mode {
             ModeName::Node => Mode::Node,
-            ModeName::Edge => Mode::Edge,
             ModeName::Face => Mode::Face,
             ModeName::Exact => Mode::Exact,
         };
@@ -198,11 +195,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     warn_of(&found.hidden, options.mode);
     if options.mode == Mode::Node {
         let coarse = coarse_contacts(&scene, &options).map_err(Failure::new)?;
-        warn_of_coarse(
-            &coarse,
-            |id| format!("instance {id}"),
-            "use --mode edge, or --mode exact --contacts-per face",
-        );
+        warn_of_coarse(&coarse, |id| format!("instance {id}"), "use --mode exact --contacts-per face");
     }
     if args.report {
         let Contacts { statistics, reductions, hidden, .. } = &found;
@@ -225,7 +218,6 @@ fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
     if !hidden.is_empty() {
         report::hint(match mode {
             Mode::Node => "the mode `node` only tests vertices: use --mode face or --mode exact",
-            Mode::Edge => "the mode `edge` only tests vertices and edges: use --mode face or --mode exact",
             Mode::Face | Mode::Exact => {
                 "their surfaces hardly enter each other, as when both bodies have the same pose: `tesdf clearance` measures the \
                  overlap; move the bodies apart"

@@ -72,8 +72,6 @@ pub struct Args {
 pub enum Mode {
     /// The vertices
     Node,
-    /// The vertices and the edges, with the exact minimum
-    Edge,
     /// The faces, by Frank-Wolfe iterations
     Face,
     /// The faces, with the exact minimum
@@ -144,7 +142,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             .body_of(id)
             .map_or("a body".into(), |body| format!("`{}`", loaded.scene.bodies[body].get_ref().name))
     };
-    warn_of_coarse(&coarse, name, "use mode = \"edge\" or mode = \"exact\" under [detector]");
+    warn_of_coarse(&coarse, name, "use mode = \"exact\" under [detector]");
     let engine = match device {
         Some(device) => loaded.newton_with(system, device.into_detector()),
         None => loaded.newton(system),
@@ -216,7 +214,6 @@ fn load(args: &Args, earlier: Option<&InterruptedRun>) -> Result<LoadedScene, Fa
     if let Some(mode) = args.mode {
         scene.detector.mode = match mode {
             Mode::Node => DetectorMode::Node,
-            Mode::Edge => DetectorMode::Edge,
             Mode::Face => DetectorMode::Face,
             Mode::Exact => DetectorMode::Exact,
             Mode::Off => DetectorMode::Off,

@@ -46,11 +46,10 @@ const SHOWN: usize = 10;
 fn text(r: &WhyReport, options: &CollideOptions) -> String {
     let noun = match options.mode {
         Mode::Node => "node",
-        Mode::Edge => "node or edge",
         Mode::Face | Mode::Exact => "face",
     };
-    let all = if options.mode == Mode::Edge { "nodes and edges".into() } else { format!("{noun}s") };
-    let mut text = format!("{all} of instance {} in the field of instance {}\n", r.instance_a, r.instance_b);
+    let mut text =
+        format!("{noun}s of instance {} in the field of instance {}\n", r.instance_a, r.instance_b);
     let pair = match r.pair {
         PairVerdict::Tested => "tested".to_string(),
         PairVerdict::SameInstance => "not tested: one and the same instance".into(),
@@ -60,11 +59,8 @@ fn text(r: &WhyReport, options: &CollideOptions) -> String {
         PairVerdict::BothPlanes => "not tested: both are planes".into(),
         PairVerdict::BoundsApart => format!("not tested: bounds are {:e} apart", r.bounds_gap),
     };
-    // `count` adds an s.
-    let counted = if options.mode == Mode::Edge { "part" } else { noun };
     let _ = writeln!(text, "  pair: {pair}; contact distance {:e}", r.contact_distance);
-    let _ =
-        writeln!(text, "  broad phase: {} of {}", count(r.candidates, "candidate"), count(r.total, counted));
+    let _ = writeln!(text, "  broad phase: {} of {}", count(r.candidates, "candidate"), count(r.total, noun));
     let mut parts: Vec<&PartReport> = r.parts.iter().collect();
     parts.sort_by(|x, y| x.distance().total_cmp(&y.distance()));
     for part in parts.iter().take(SHOWN) {
@@ -101,7 +97,6 @@ fn part_text(part: &PartReport, noun: &str, text: &mut String) {
             PolygonVerdict::Contact => "contact".to_string(),
             PolygonVerdict::CellBeyond => "dropped: its cell is beyond the contact distance".into(),
             PolygonVerdict::Beyond => "dropped: beyond the contact distance".into(),
-            PolygonVerdict::AtEnd => "dropped: an end of the edge, which is tested as a node".into(),
             PolygonVerdict::Descending => "dropped: the surface is lower beside it".into(),
             PolygonVerdict::OutOfCones => "dropped: other places of the bodies meet first".into(),
             PolygonVerdict::Filtered { cosine } => format!("dropped by the cosine filter: {cosine:.4}"),

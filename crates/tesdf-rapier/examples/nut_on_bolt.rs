@@ -25,10 +25,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let step = argument(2, "1").parse::<f64>()? * 1e-3;
     let mode = match argument(3, "node").as_str() {
         "node" => Mode::Node,
-        "edge" => Mode::Edge,
         "face" => Mode::Face,
         "exact" => Mode::Exact,
-        other => return Err(format!("{other}: expected node, edge, face or exact").into()),
+        other => return Err(format!("{other}: expected node, face or exact").into()),
     };
     let contact_distance = argument(5, "0.2").parse::<f64>()? * 1e-3;
     let reduction = match argument(4, "64").as_str() {

@@ -80,8 +80,6 @@ pub struct Args {
 pub enum ModeName {
     /// The vertices
     Node,
-    /// The vertices and the edges, with the exact minimum
-    Edge,
     /// The faces, by Frank-Wolfe iterations
     Face,
     /// The faces, with the exact minimum
@@ -92,7 +90,6 @@ impl From<ModeName> for Mode {
     fn from(name: ModeName) -> Self {
         match name {
             ModeName::Node => Self::Node,
-            ModeName::Edge => Self::Edge,
             ModeName::Face => Self::Face,
             ModeName::Exact => Self::Exact,
         }

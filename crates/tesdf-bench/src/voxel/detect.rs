@@ -21,7 +21,7 @@ use super::{VoxelGrid, VoxelValue};
 /// contacts. Three things differ:
 ///
 /// - The extremes of flat faces are not searched, only their lowest points.
-/// - The modes [`Edge`](Mode::Edge) and [`Exact`](Mode::Exact) and reductions are refused.
+/// - The mode [`Exact`](Mode::Exact) and reductions are refused.
 /// - Hidden overlaps of pairs with grids are not searched, because that needs exact distances.
 ///
 /// A grid knows no faces. So [`Contact::face_b`] and the feature of *b* are the block of the grid
@@ -45,8 +45,8 @@ impl Detect for VoxelDetector {
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
         options.validate()?;
         let refuse = |option, found: String, expected| Err(CollideError::Option { option, found, expected });
-        if let Some(mode) = exact_mode(options.mode) {
-            return refuse("mode", mode.into(), "node or face: a grid has no exact minimum");
+        if options.mode == Mode::Exact {
+            return refuse("mode", "exact".into(), "node or face: a grid has no exact minimum");
         }
         if options.reduction != Reduction::None {
             return refuse("reduction", format!("{:?}", options.reduction), "none, for voxel grids");
@@ -84,15 +84,6 @@ impl Detect for VoxelDetector {
     /// The distances of a grid are not exact.
     fn holds_all(&self, _: &CollideOptions) -> bool {
         false
-    }
-}
-
-/// The name of a mode that needs exact minima.
-fn exact_mode(mode: Mode) -> Option<&'static str> {
-    match mode {
-        Mode::Edge => Some("edge"),
-        Mode::Exact => Some("exact"),
-        Mode::Node | Mode::Face => None,
     }
 }
 

@@ -138,7 +138,7 @@ fn a_hidden_overlap_is_reported_and_meets_no_criterion() {
     assert!(depth > 2e-3 && json["deepest_penetration"].as_f64().unwrap() >= depth, "{json}");
     assert!(err.contains("bodies below and above overlapped by") && err.contains("--mode face"), "{err}");
     assert!(
-        err.contains("of `below` touches `above`") && err.contains("use mode = \"edge\" or mode = \"exact\""),
+        err.contains("of `below` touches `above`") && err.contains("use mode = \"exact\" under"),
         "{err}"
     );
     // The record has it as well.

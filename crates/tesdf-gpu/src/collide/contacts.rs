@@ -205,13 +205,12 @@ fn surface_names(shape: &Shape, mode: Mode, words: &Words) -> (u32, u32) {
             let node = simple.nodes().iter().position(|&(p, _)| p == point).unwrap_or(0);
             (part, node as u32)
         }
-        // A detection refuses edges.
-        (Mode::Edge | Mode::Face | Mode::Exact, Shape::Mesh(asset)) => {
+        (Mode::Face | Mode::Exact, Shape::Mesh(asset)) => {
             let face = asset.face_id(part as usize);
             (face, face)
         }
-        (Mode::Edge | Mode::Face | Mode::Exact, Shape::Plane) => (0, 0),
-        (Mode::Edge | Mode::Face | Mode::Exact, _) => (part, part),
+        (Mode::Face | Mode::Exact, Shape::Plane) => (0, 0),
+        (Mode::Face | Mode::Exact, _) => (part, part),
     }
 }
 

@@ -131,8 +131,8 @@ impl Detector {
     ///   growing buffer exceeds the limit of the device.
     /// - [`GpuError::Shape`] when a shape cannot be uploaded, or a vertex was moved to an invalid
     ///   position.
-    /// - [`GpuError::Unavailable`] for the mode [`Edge`](Mode::Edge), and when vertices have moved
-    ///   on the device and the scene now has other shapes.
+    /// - [`GpuError::Unavailable`] when vertices have moved on the device and the scene now has
+    ///   other shapes.
     /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)
@@ -363,12 +363,6 @@ impl Detector {
 /// Validates options. On a device, spread contacts are those of a reduction.
 fn possible(options: &CollideOptions) -> Result<CollideOptions, GpuError> {
     options.validate()?;
-    if options.mode == Mode::Edge {
-        return Err(GpuError::Unavailable {
-            what: "the mode `edge`".into(),
-            instead: "use the mode `exact`, or detect on the processor",
-        });
-    }
     let reduction = match options.reduction {
         Reduction::Spread(n) => Reduction::PerPair(n),
         reduction => reduction,

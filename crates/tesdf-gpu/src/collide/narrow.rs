@@ -28,8 +28,7 @@ impl Pass<'_> {
                 self.narrow_faces()?;
                 if self.detector.shapes.rules.jumps { self.narrow_exact(Fields::Open) } else { Ok(()) }
             }
-            // A detection refuses edges.
-            Mode::Edge | Mode::Exact => self.narrow_exact(Fields::All),
+            Mode::Exact => self.narrow_exact(Fields::All),
         }
     }
 

@@ -32,11 +32,8 @@ pub enum Parts {
 pub fn parts(options: &CollideOptions) -> Parts {
     match (options.mode, options.contacts_per) {
         (Mode::Node, _) => Parts::Nodes,
-        // A detection refuses edges.
         (Mode::Face | Mode::Exact, ContactsPer::Cell) => Parts::Polygons,
-        (Mode::Edge, _) | (Mode::Face | Mode::Exact, ContactsPer::Face | ContactsPer::Minimum) => {
-            Parts::Faces
-        }
+        (Mode::Face | Mode::Exact, ContactsPer::Face | ContactsPer::Minimum) => Parts::Faces,
     }
 }
 

@@ -309,16 +309,6 @@ fn every_variant_of_the_narrow_phase_gives_the_same_contacts() {
 }
 
 #[test]
-fn the_mode_edge_is_refused() {
-    let scene = worlds(1, &mut Random(1));
-    let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("fits");
-    let error = detector.detect(&scene, &CollideOptions::with_mode(Mode::Edge)).expect_err("no kernel");
-    assert!(matches!(error, GpuError::Unavailable { .. }), "{error}");
-    let text = error.to_string();
-    assert!(text.contains("`edge`") && text.contains("`exact`"), "{text}");
-}
-
-#[test]
 fn scenes_without_contacts_are_no_errors() {
     let mut random = Random(1);
     let scene = worlds(1, &mut random);

@@ -300,7 +300,6 @@ fn what_only_the_processor_does_is_an_error() {
         ),
         (of(Mode::Exact, ContactsPer::Minimum, Reduction::None), "leaving contacts per minimum there"),
         (of(Mode::Node, ContactsPer::Face, Reduction::Deepest(4)), "leaving the deepest contacts there"),
-        (of(Mode::Edge, ContactsPer::Face, Reduction::None), "the mode `edge` is not available"),
     ] {
         let error =
             detector.detect_on_device(&scene, None, &options).map(|found| found.count).expect_err("refused");

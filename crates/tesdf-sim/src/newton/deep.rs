@@ -48,7 +48,7 @@ struct Push {
     cosine: f64,
 }
 
-/// The normals of the vertices, edges or faces of the meshes and boxes of a scene, and their
+/// The normals of the vertices or faces of the meshes and boxes of a scene, and their
 /// vertices, in the frames of the shapes.
 #[derive(Clone, Debug)]
 pub struct Surfaces {
@@ -74,12 +74,6 @@ impl Surfaces {
             };
             let normals = match mode {
                 Mode::Node => normals_of_vertices(asset),
-                Mode::Edge => {
-                    let mut normals = normals_of_vertices(asset);
-                    normals.resize(asset.arrays().vertices.len(), DVec3::ZERO);
-                    normals.extend(normals_of_edges(asset));
-                    normals
-                }
                 Mode::Face | Mode::Exact => normals_of_faces(asset),
             };
             Some((id, Surface { normals, vertices: vertices(asset) }))
@@ -146,7 +140,7 @@ impl Surfaces {
     }
 
     /// The cosine between the normal of a contact and that of its vertex or face. Planes and
-    /// rounded shapes are always opposed, and so are the edges of boxes.
+    /// rounded shapes are always opposed.
     fn cosine(&self, scene: &Scene, contact: &Contact) -> f64 {
         let own = || {
             let (surface, pose, _) = self.of(scene, contact.instance_a)?;
@@ -197,7 +191,7 @@ fn has_rear(pushes: &[Push]) -> bool {
 fn of_box(shape: &Shape, mode: Mode) -> Surface {
     let vertices: Vec<DVec3> = shape.nodes().into_iter().map(|(corner, _)| corner).collect();
     let normals = match mode {
-        Mode::Node | Mode::Edge => vertices.iter().map(|corner| corner.signum().normalize()).collect(),
+        Mode::Node => vertices.iter().map(|corner| corner.signum().normalize()).collect(),
         Mode::Face | Mode::Exact => {
             let normal = |part: &Vec<DVec3>| (part[1] - part[0]).cross(part[2] - part[0]).normalize_or_zero();
             shape.parts().0.iter().map(normal).collect()
@@ -244,29 +238,6 @@ fn normals_of_faces(asset: &TeSdf) -> Vec<DVec3> {
     for face in 0..asset.face_count() {
         let [p, q, r] = asset.face_corners(face);
         normals[asset.face_id(face) as usize] = (q - p).cross(r - p).normalize_or_zero();
-    }
-    normals
-}
-
-/// The mean of the normals of the faces that have a side of a face, as a unit vector, by 3 × face +
-/// side.
-fn normals_of_edges(asset: &TeSdf) -> Vec<DVec3> {
-    let edge = |[p, q]: [u32; 2]| [p.min(q), p.max(q)];
-    let sides = |face: usize| {
-        let [p, q, r] = asset.face_vertices(face);
-        [[p, q], [q, r], [r, p]].map(edge)
-    };
-    let of_faces = normals_of_faces(asset);
-    let normal = |face: usize| of_faces[asset.face_id(face) as usize];
-    let mut sums: BTreeMap<[u32; 2], DVec3> = BTreeMap::new();
-    for face in 0..asset.face_count() {
-        sides(face).into_iter().for_each(|side| *sums.entry(side).or_default() += normal(face));
-    }
-    let mut normals = vec![DVec3::ZERO; 3 * asset.face_count()];
-    for face in 0..asset.face_count() {
-        for (k, side) in sides(face).into_iter().enumerate() {
-            normals[3 * asset.face_id(face) as usize + k] = sums[&side].normalize_or_zero();
-        }
     }
     normals
 }

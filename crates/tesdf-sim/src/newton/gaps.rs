@@ -114,7 +114,7 @@ impl<'a> Gaps<'a> {
     /// gap is the distance above the skin.
     pub fn find<'c>(&self, contacts: &'c [Contact], poses: &[Pose]) -> (Vec<Found<'c>>, Vec<Row>) {
         let normals = match self.mode {
-            Mode::Node | Mode::Edge => Some(normals(contacts)),
+            Mode::Node => Some(normals(contacts)),
             // Those of the detection are in the normal cones.
             Mode::Face | Mode::Exact => None,
         };

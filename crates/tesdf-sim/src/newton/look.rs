@@ -113,8 +113,8 @@ impl Way {
     }
 }
 
-/// The contacts of two looks at the same pairs. Where both have contacts of a face, an edge or a
-/// node, those of the look that has more.
+/// The contacts of two looks at the same pairs. Where both have contacts of a face or a node, those
+/// of the look that has more.
 fn union(own: Vec<Contact>, other: Vec<Contact>) -> Vec<Contact> {
     let mut parts: BTreeMap<_, [Vec<Contact>; 2]> = BTreeMap::new();
     for (look, contacts) in [own, other].into_iter().enumerate() {

@@ -41,7 +41,7 @@ pub const PUSHES: [f64; 2] = [0.0, f64::INFINITY];
 /// What a row is about. Rows of the same id in two minimisations have nearly the same force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RowId {
-    /// The instances of a contact, and the face, edge or vertex of the first one.
+    /// The instances of a contact, and the face or vertex of the first one.
     Contact([InstanceId; 2], u32),
     /// The number of a row among those of all joints.
     Joint(usize),

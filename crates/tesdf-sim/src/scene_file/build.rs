@@ -132,9 +132,7 @@ impl LoadedScene {
                 found.retain(|c| is_free(c.instance_a) || is_free(c.instance_b));
                 Ok(found)
             }
-            DetectorMode::Edge | DetectorMode::Face | DetectorMode::Exact | DetectorMode::Off => {
-                Ok(Vec::new())
-            }
+            DetectorMode::Face | DetectorMode::Exact | DetectorMode::Off => Ok(Vec::new()),
         }
     }
 
@@ -160,7 +158,6 @@ impl Detect for Nothing {
 fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions {
     let mode = match section.mode {
         DetectorMode::Node | DetectorMode::Off => Mode::Node,
-        DetectorMode::Edge => Mode::Edge,
         DetectorMode::Face => Mode::Face,
         DetectorMode::Exact => Mode::Exact,
     };

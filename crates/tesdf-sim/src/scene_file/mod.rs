@@ -284,8 +284,6 @@ pub enum ShapeSection {
 pub enum DetectorMode {
     /// The vertices.
     Node,
-    /// The vertices and the edges, with the exact minimum.
-    Edge,
     /// The faces, by a fixed number of Frank–Wolfe iterations.
     Face,
     /// The faces, with the exact minimum.
@@ -306,8 +304,7 @@ pub struct DetectorSection {
     pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations in the mode `face`.
     pub iterations: u32,
-    /// Tolerance in the modes `exact` and `edge`, as a fraction of the diagonal of the body with
-    /// the field.
+    /// Tolerance in the mode `exact`, as a fraction of the diagonal of the body with the field.
     pub tolerance: f64,
     /// Cosine filter of the modes `face` and `exact`.
     pub cos_theta: Option<f64>,

@@ -1,4 +1,4 @@
-//! Where a mesh is convex around its vertices.
+//! Where a mesh is convex around its vertices, and the faces beside each other there.
 use glam::DVec3;
 
 use super::TeSdf;
@@ -18,6 +18,19 @@ impl TeSdf {
         // On one thread: a thread that waits could take up a task that waits for this.
         self.corner_cones
             .get_or_init(|| (0..self.vertices.len() as u32).map(|vertex| self.corner_cone(vertex)).collect())
+    }
+
+    /// The other faces that have a side of a face. Side k goes from corner k to the next one.
+    pub(crate) fn faces_beside(&self, face: usize, side: usize) -> impl Iterator<Item = usize> {
+        let corners = self.faces[face];
+        let (start, end) = (corners[side], corners[(side + 1) % 3]);
+        let mut last = face;
+        self.faces_at(start).iter().map(|&other| other as usize).filter(move |&other| {
+            // A face that has the vertex twice is named twice.
+            let is_new = other != face && other != last && self.faces[other].contains(&end);
+            last = if is_new { other } else { last };
+            is_new
+        })
     }
 
     fn corner_cone(&self, vertex: u32) -> f32 {

@@ -36,8 +36,6 @@ mod motion;
 pub(crate) mod options;
 mod roots;
 mod section;
-#[cfg(feature = "collide")]
-mod sharp_edges;
 mod te_sdf;
 #[cfg(feature = "encode")]
 mod write;

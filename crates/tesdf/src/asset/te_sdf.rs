@@ -78,8 +78,6 @@ pub struct TeSdf {
     #[cfg(feature = "collide")]
     faces_at: OnceLock<FacesAt>,
     #[cfg(feature = "collide")]
-    pub(super) sharp_sides: OnceLock<Vec<u8>>,
-    #[cfg(feature = "collide")]
     pub(super) corner_cones: OnceLock<Vec<f32>>,
     pub(crate) inner_ball: OnceLock<InnerBall>,
     pub(crate) corner_reaches: OnceLock<Vec<f32>>,
@@ -173,8 +171,6 @@ impl TeSdf {
             #[cfg(feature = "collide")]
             faces_at: OnceLock::new(),
             #[cfg(feature = "collide")]
-            sharp_sides: OnceLock::new(),
-            #[cfg(feature = "collide")]
             corner_cones: OnceLock::new(),
             inner_ball: OnceLock::new(),
             corner_reaches: OnceLock::new(),
@@ -263,7 +259,6 @@ impl TeSdf {
         self.corner_reaches = OnceLock::new();
         #[cfg(feature = "collide")]
         {
-            self.sharp_sides = OnceLock::new();
             self.corner_cones = OnceLock::new();
         }
         self.forget_normals();

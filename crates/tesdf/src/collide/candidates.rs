@@ -53,8 +53,8 @@ fn of_pair(pair: &OrderedPair) -> Vec<Candidate> {
     found
 }
 
-/// Number of faces, edges or nodes that the broad phase leaves. For the time of the broad phase:
-/// the work of [`detect`](super::detect()) up to there, on the same threads.
+/// Number of faces or nodes that the broad phase leaves. For the time of the broad phase: the work
+/// of [`detect`](super::detect()) up to there, on the same threads.
 ///
 /// # Errors
 /// As [`detect`](super::detect()).

@@ -7,8 +7,8 @@ use super::{HiddenOverlap, InstanceId};
 
 /// A place where body *a* touches body *b*, in the world's unit and frame.
 ///
-/// *a* is the body that has the face, edge or node. *b* is the body whose signed distance field
-/// `φ_b` is used.
+/// *a* is the body that has the face or node. *b* is the body whose signed distance field `φ_b` is
+/// used.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Contact {
     /// The witness point on `face_a`.
@@ -24,20 +24,20 @@ pub struct Contact {
     /// φ_b at `point_a`; negative where the bodies penetrate. With
     /// [`ContactsPer::Minimum`](super::ContactsPer::Minimum), the distance along the normal.
     pub distance: f64,
-    /// The face of a, 0-based in the encoded mesh. For a node or edge, the lowest face that has it.
+    /// The face of a, 0-based in the encoded mesh. For a node, the lowest face that has it.
     pub face_a: u32,
     /// The face of b that is closest to `point_a`.
     pub face_b: u32,
     /// The cell of b's domain, as the index of its word in `domain.nodes`; `None` where the face
     /// tree or a formula answered.
     pub tet_b: Option<u32>,
-    /// The body that has the face, edge or node.
+    /// The body that has the face or node.
     pub instance_a: InstanceId,
     /// The body whose field is used.
     pub instance_b: InstanceId,
     /// The touching features. It stays the same from step to step while the same features touch.
     pub feature: FeatureId,
-    /// Whether it is proved that no point of the face or edge is deeper by more than the tolerance.
+    /// Whether it is proved that no point of the face is deeper by more than the tolerance.
     /// False when a search was cut short, and where no bound proves a result of the mode
     /// [`Face`](super::Mode::Face). A GPU does not compute that bound.
     pub converged: bool,
@@ -47,10 +47,6 @@ pub struct Contact {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct FeatureId {
     /// Face of a. In the mode [`Node`](super::Mode::Node), the vertex of a.
-    ///
-    /// In the mode [`Edge`](super::Mode::Edge), vertices have their ids, and edges the numbers from
-    /// the number of vertices on: an edge is the number of vertices + 3 × face + side. The face is
-    /// the lowest that has the edge, and side k goes from its corner k to the next one.
     pub a: u32,
     /// The closest feature of b.
     pub b: FeatureB,
@@ -73,11 +69,11 @@ pub enum FeatureB {
 pub struct Statistics {
     /// Ordered pairs of instances whose bounds overlap.
     pub instance_pairs: usize,
-    /// Faces, edges or nodes of a that remain after the broad phase, over all pairs. With
+    /// Faces or nodes of a that remain after the broad phase, over all pairs. With
     /// [`Deepest`](super::Reduction::Deepest), this and all other numbers count what was looked at.
     pub candidates: usize,
     /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell.
-    /// With one contact per face: faces. An edge counts once.
+    /// With one contact per face: faces.
     pub polygons: usize,
     /// Contacts within the contact distance.
     pub touching: usize,
@@ -154,9 +150,9 @@ pub struct Contacts {
     pub statistics: Statistics,
     /// The loss from the reduction, for each pair of instances; empty without reduction.
     pub reductions: Vec<PairReduction>,
-    /// Pairs that overlap without a contact that shows it, which happens in the modes
-    /// [`Node`](super::Mode::Node) and [`Edge`](super::Mode::Edge). Sorted by world and instances.
-    /// Contacts will not keep these pairs apart.
+    /// Pairs that overlap without a contact that shows it, which happens in the mode
+    /// [`Node`](super::Mode::Node). Sorted by world and instances. Contacts will not keep these
+    /// pairs apart.
     pub hidden: Vec<HiddenOverlap>,
 }
 

@@ -1,7 +1,7 @@
-//! The contacts of some faces, edges or nodes of an ordered pair.
+//! The contacts of some faces or nodes of an ordered pair.
 use super::Contact;
 use super::narrow::Minimum;
-use super::ordered_pair::{Dropped, OrderedPair};
+use super::ordered_pair::OrderedPair;
 use super::surface::Part;
 use crate::geometry::Aabb;
 use crate::parallel::*;
@@ -70,24 +70,21 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut rest = parts.as_slice();
     let mut next = candidates.iter();
     while !rest.is_empty() {
-        let is_whole = |(part, ..): &(Part, u32, u32)| pair.search.is_whole(part);
-        let nodes = rest.iter().take_while(|part| !is_whole(part)).count();
-        let (group, others) = rest.split_at(if nodes == 0 { near_each_other(rest) } else { nodes });
+        let of_faces = pair.search.is_of_faces();
+        let (group, others) = rest.split_at(if of_faces { near_each_other(rest) } else { rest.len() });
         rest = others;
         let parts = || group.iter().map(|(part, ..)| part);
-        let around = match nodes {
-            0 => pair.search_of(parts()).surroundings(&pair.field, parts()),
-            _ => None,
+        let around = match of_faces {
+            true => pair.search_of(parts()).surroundings(&pair.field, parts()),
+            false => None,
         };
         for ((part, face_a, feature), &candidate) in group.iter().zip(&mut next) {
             let mut found = |minimum: Minimum| {
                 let (minimum, cosine) = pair.faced(part, candidate, minimum);
-                let contact = match pair.contact(part, candidate, &minimum, cosine, [*face_a, *feature]) {
-                    Ok(contact) => contact,
-                    Err(dropped) => {
-                        *filtered += usize::from(!matches!(dropped, Dropped::AtEnd));
-                        return;
-                    }
+                let ids = [*face_a, *feature];
+                let Ok(contact) = pair.contact(part, candidate, &minimum, cosine, ids) else {
+                    *filtered += 1;
+                    return;
                 };
                 if let Some(vertex) = pair.vertex(part, &minimum) {
                     at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });

@@ -5,9 +5,8 @@
 //! the same pose overlap although no surface is inside the other body, so no face shows it either.
 //!
 //! Two searches find such overlaps. Neither changes a contact.
-//! - In node and edge mode, the faces of each body are searched in the field of the other. A face
-//!   is deeper than its deepest corner by at most its [`corner_reach`], so finely meshed faces are
-//!   skipped.
+//! - In node mode, the faces of each body are searched in the field of the other. A face is deeper
+//!   than its deepest corner by at most its [`corner_reach`], so finely meshed faces are skipped.
 //! - In every mode, the centre of a ball inside each body is tested in the field of the other.
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -135,7 +134,7 @@ fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode, shown: f64) -> f6
     }
     let deepest = radius.min(field.half_thickness() - at_center).max(0.0);
     let mut search = Looks { field, core, thickness, shown, deepest, looks: 0 };
-    if matches!(mode, Mode::Node | Mode::Edge) {
+    if mode == Mode::Node {
         let faces = search.faces(surface);
         search.search(faces);
     }

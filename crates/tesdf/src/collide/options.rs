@@ -10,11 +10,6 @@ use crate::query::Precision;
 pub enum Mode {
     /// Node-TES: the vertices.
     Node,
-    /// The vertices, as [`Node`](Self::Node), and the edges where the surface is convex: the least
-    /// signed distance over each, within a [`tolerance`](CollideOptions::tolerance). Of bodies that
-    /// are apart, this finds the least distance. Where an edge lies on the other body, or is large
-    /// and near it, the ends of that part are contacts, so that bars that cross hold each other.
-    Edge,
     /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9). A fixed number of
     /// Frank–Wolfe [`iterations`](CollideOptions::iterations) gives an upper bound of the minimum.
     /// In the field of an open mesh, whose signed distance jumps, it searches as
@@ -90,29 +85,29 @@ pub enum HiddenSearch {
 /// Options of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CollideOptions {
-    /// Nodes, edges or faces, and the method.
+    /// Nodes or faces, and the method.
     pub mode: Mode,
     /// One contact for each cell that a face meets, for each face, or for each local minimum. Not
-    /// used for nodes and edges.
+    /// used for nodes.
     #[serde(default = "per_cell")]
     pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations of the mode [`Face`](Mode::Face), at most
     /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). Each evaluates the field once. The paper uses 16.
     pub iterations: u32,
-    /// Bound of the error of the modes [`Exact`](Mode::Exact) and [`Edge`](Mode::Edge), and of
-    /// results of the mode [`Face`](Mode::Face) that count as converged: a fraction of the diagonal
-    /// of the field's body, or a length in the world's unit.
+    /// Bound of the error of the mode [`Exact`](Mode::Exact), and of results of the mode
+    /// [`Face`](Mode::Face) that count as converged: a fraction of the diagonal of the field's
+    /// body, or a length in the world's unit.
     pub tolerance: Length,
     /// Contacts are reported up to this signed distance, in the world's unit. It may be wider than
     /// the band of an asset: outside the domain, the face tree answers, also exactly.
     pub contact_distance: f64,
     /// Adds to a pair's contact distance what the velocities of the two instances, relative to each
     /// other, can close within this time; 0 adds nothing. Instances that move together add next to
-    /// nothing, whatever their speed. Faces, edges and vertices add what their own place closes,
-    /// if that is less.
+    /// nothing, whatever their speed. Faces and vertices add what their own place closes, if that
+    /// is less.
     pub speculative_time: f64,
     /// Eq. (10): a contact of a face is dropped when ∇φ · n > −cos θ. `None` keeps all. Not used
-    /// for nodes and edges.
+    /// for nodes.
     pub cos_theta: Option<f64>,
     /// Number of contacts kept per pair of instances.
     pub reduction: Reduction,

@@ -22,8 +22,6 @@ pub enum Dropped {
     Descending,
     /// No direction is in the normal cones of both bodies.
     OutOfCones,
-    /// The point is an end of an edge, which has a contact of its own.
-    AtEnd,
 }
 
 /// Bodies that close by more than this part of the smaller diagonal within the speculative time may
@@ -32,7 +30,7 @@ const FAST: f64 = 0.1;
 
 /// The surface of one body and the field of another.
 pub struct OrderedPair<'a> {
-    /// The body that has the faces, edges or nodes.
+    /// The body that has the faces or nodes.
     pub surface: SurfaceBody<'a>,
     /// The body whose signed distances are used.
     pub field: FieldBody<'a>,
@@ -117,11 +115,6 @@ impl<'a> OrderedPair<'a> {
     pub fn candidates(&self) -> Candidates {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, &self.reach),
-            Mode::Edge => {
-                let mut both = self.surface.nodes(&self.field, &self.reach);
-                both.extend(self.surface.edges(&self.field, &self.reach));
-                both
-            }
             // The search over a face begins with the test by which `faces` drops it.
             Mode::Face | Mode::Exact if self.search.is_of_faces() => {
                 self.surface.faces_of_leaves(&self.field, &self.reach)
@@ -141,16 +134,9 @@ impl<'a> OrderedPair<'a> {
         self.options.mode
     }
 
-    /// A candidate, the id of its face, and its feature: the id of the node, the edge or the face.
+    /// A candidate, the id of its face, and its feature: the id of the node or the face.
     pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
         match self.options.mode {
-            Mode::Edge if self.surface.is_edge(candidate) => {
-                let (face, id) = self.surface.edge_ids(candidate);
-                (self.surface.edge(candidate), face, id)
-            }
-            Mode::Edge => {
-                (self.surface.node_of_faces(candidate), self.surface.face_of_node(candidate), candidate)
-            }
             Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
             Mode::Face | Mode::Exact => {
                 let face = self.surface.face_id(candidate);
@@ -196,8 +182,6 @@ impl<'a> OrderedPair<'a> {
     ) -> Result<Contact, Dropped> {
         match self.options.mode {
             Mode::Node => {}
-            Mode::Edge if part.points().len() == 2 && minimum.corner.is_some() => return Err(Dropped::AtEnd),
-            Mode::Edge => {}
             Mode::Face | Mode::Exact => self.check_face(part, candidate, minimum, cosine)?,
         }
         let contact = self.touching(part, minimum, ids);
@@ -242,16 +226,15 @@ impl<'a> OrderedPair<'a> {
                 match self.options.mode {
                     // Frank–Wolfe need not find the lower point.
                     Mode::Face => self.search.within(reach).frank_wolfe(&self.field, face) < at.distance,
-                    Mode::Node | Mode::Edge | Mode::Exact => at.distance <= reach,
+                    Mode::Node | Mode::Exact => at.distance <= reach,
                 }
             })
     }
 
-    /// The vertex at which a minimum is, by its bits; `None` in the modes node and edge, where
-    /// each vertex has one contact, and for contacts per cell.
+    /// The vertex at which a minimum is, by its bits; `None` in the mode node, where each
+    /// vertex has one contact, and for contacts per cell.
     pub fn vertex(&self, part: &Part, minimum: &Minimum) -> Option<[u64; 3]> {
-        let one_each = matches!(self.options.mode, Mode::Node | Mode::Edge)
-            || self.options.contacts_per == ContactsPer::Cell;
+        let one_each = self.options.mode == Mode::Node || self.options.contacts_per == ContactsPer::Cell;
         let corner = minimum.corner.filter(|_| !one_each)?;
         Some(part.points()[usize::from(corner)].to_array().map(f64::to_bits))
     }

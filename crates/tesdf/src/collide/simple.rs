@@ -119,23 +119,6 @@ impl Simple {
         if let Self::Round { radius, .. } = *self { radius } else { 0.0 }
     }
 
-    /// The edges: twelve of a box, the segment of a capsule.
-    pub fn edges(&self) -> impl Iterator<Item = SimpleEdge> {
-        let count = match *self {
-            Self::Box(_) => EDGES.len(),
-            Self::Round { half_height, .. } if half_height != 0.0 => 1,
-            Self::Plane | Self::Round { .. } => 0,
-        };
-        let simple = *self;
-        (0..count).map(move |k| match simple {
-            Self::Box(half) => box_edge(half, EDGES[k]),
-            _ => {
-                let points = [0, 1].map(|end| simple.node(end));
-                SimpleEdge { id: 0, points, normals: [DVec3::ZERO; 2] }
-            }
-        })
-    }
-
     /// Number of distinct points of the parts.
     pub fn node_count(&self) -> u32 {
         match *self {
@@ -172,17 +155,6 @@ impl Simple {
 /// The points of a part.
 pub type Points = ArrayVec<DVec3, 3>;
 
-/// An edge of a box, or the core of a capsule.
-#[derive(Clone, Copy, Debug)]
-pub struct SimpleEdge {
-    /// 3 × part + side: that side of the lowest part that has it.
-    pub id: u32,
-    /// Its ends.
-    pub points: [DVec3; 2],
-    /// The normals of the two sides of a box; zero for a capsule.
-    pub normals: [DVec3; 2],
-}
-
 fn box_value(p: DVec3, half: DVec3) -> (f64, DVec3, DVec3, u32) {
     let clamped = p.clamp(-half, half);
     let sign = DVec3::from_array(p.to_array().map(|x| if x < 0.0 { -1.0 } else { 1.0 }));
@@ -202,7 +174,7 @@ fn box_value(p: DVec3, half: DVec3) -> (f64, DVec3, DVec3, u32) {
     (-depth[axis], gradient, closest, side)
 }
 
-// The faces, corners and edges of all boxes are the same but for the lengths, so they are tables: a
+// The faces and corners of all boxes are the same but for the lengths, so they are tables: a
 // detection asks for them at each contact. A corner is a number whose bit k is set where its
 // coordinate k is positive.
 
@@ -238,37 +210,12 @@ const NODES: [(usize, u32); 8] = {
     nodes
 };
 
-/// The edges in the same order: 3 × triangle + side, and the two corners. The diagonals of the sides
-/// are none.
-const EDGES: [(u32, [usize; 2]); 12] = {
-    let (mut edges, mut count, mut seen) = ([(0, [0; 2]); 12], 0, [0; 8]);
-    let mut k = 0;
-    while k < 3 * TRIANGLES.len() {
-        let (p, q) = (TRIANGLES[k / 3][k % 3], TRIANGLES[k / 3][(k + 1) % 3]);
-        if (p ^ q).is_power_of_two() && seen[p] >> q & 1 == 0 {
-            (seen[p], seen[q]) = (seen[p] | 1 << q, seen[q] | 1 << p);
-            edges[count] = (k as u32, [p, q]);
-            count += 1;
-        }
-        k += 1;
-    }
-    edges
-};
-
 fn box_corner(half: DVec3, corner: usize) -> DVec3 {
     DVec3::from_array(std::array::from_fn(
         |axis| {
             if corner >> axis & 1 == 1 { half[axis] } else { -half[axis] }
         },
     ))
-}
-
-fn box_edge(half: DVec3, (id, [p, q]): (u32, [usize; 2])) -> SimpleEdge {
-    let along = (p ^ q).trailing_zeros() as usize;
-    let outward = |axis: usize| DVec3::AXES[axis] * if p >> axis & 1 == 1 { 1.0 } else { -1.0 };
-    // The two other axes, the lower one first.
-    let normals = [usize::from(along == 0), if along == 2 { 1 } else { 2 }].map(outward);
-    SimpleEdge { id, points: [p, q].map(|corner| box_corner(half, corner)), normals }
 }
 
 /// The square of the plane z = 0 that contains all its points within `radius` of `center`, as two
@@ -281,8 +228,6 @@ pub fn plane_square(center: DVec3, radius: f64) -> [[DVec3; 3]; 2] {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::*;
     use crate::geometry::Triangle;
 
@@ -324,22 +269,6 @@ mod tests {
         assert!((sphere.value(p).distance - (9.25f64.sqrt() - 2.0)).abs() < 1e-15);
         assert_eq!(sphere.value(DVec3::ZERO).distance, -2.0);
         assert_eq!(capsule.nodes().count(), 2);
-        assert_eq!(capsule.edges().count(), 1);
-        assert_eq!(sphere.edges().count() + Simple::Plane.edges().count(), 0);
-    }
-
-    #[test]
-    fn a_box_has_twelve_edges() {
-        let half = DVec3::new(1.0, 2.0, 3.0);
-        let simple = Simple::Box(half);
-        let ids: BTreeSet<u32> = simple.edges().map(|edge| edge.id).collect();
-        assert_eq!(ids.len(), 12);
-        for SimpleEdge { id, points: [p, q], normals: [m, n] } in simple.edges() {
-            assert_eq!((p != q, m.dot(n), m.dot(p - q), n.dot(p - q)), (true, 0.0, 0.0, 0.0));
-            assert!(m.dot(p) > 0.0 && n.dot(p) > 0.0 && m.dot(q) > 0.0 && n.dot(q) > 0.0);
-            let part = simple.part(id / 3);
-            assert_eq!((part[id as usize % 3], part[(id as usize + 1) % 3]), (p, q));
-        }
     }
 
     #[test]

@@ -1,11 +1,11 @@
-//! The body of a pair whose surface is tested, and the broad phase, which finds its faces,
-//! edges or nodes that can touch a field.
+//! The body of a pair whose surface is tested, and the broad phase, which finds its faces or nodes
+//! that can touch a field.
 use glam::{DMat3, DVec3, Vec3};
 
 use super::branch::Branch;
 use super::field::{Field, FieldBody};
 use super::reach::Reach;
-use super::simple::{Points, Simple, SimpleEdge, plane_square};
+use super::simple::{Points, Simple, plane_square};
 use super::{Mode, Placement, Shape};
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
@@ -26,22 +26,18 @@ pub struct SurfaceBody<'a> {
     around: f64,
 }
 
-/// The result of the broad phase: faces, edges or nodes of a surface that can touch, in order. In
-/// edge mode, numbers below that of the nodes are nodes.
+/// The result of the broad phase: faces or nodes of a surface that can touch, in order.
 pub type Candidates = Vec<u32>;
 
-/// A face, an edge, or the core of a rounded shape, in the field's frame.
+/// A face, a node, or the core of a rounded shape, in the field's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
     points: [DVec3; 3],
     count: usize,
     /// The surface lies within this distance of the part.
     pub radius: f64,
-    /// Unit normal; zero for a rounded shape or a part without area. For an edge, and for a node in
-    /// edge mode, the mean of those of its faces.
+    /// Unit normal; zero for a rounded shape or a part without area.
     pub normal: DVec3,
-    /// The least cosine between the normal and that of a face that has the part.
-    pub cosine: f64,
     /// Whether the normal is right everywhere on the part.
     pub facing: PartFacing,
 }
@@ -57,25 +53,13 @@ pub enum PartFacing {
 
 impl Part {
     fn new(points: &[DVec3], radius: f64) -> Self {
-        let (normal, cosine, facing) = (DVec3::ZERO, 1.0, PartFacing::Everywhere);
-        let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal, cosine, facing };
+        let (normal, facing) = (DVec3::ZERO, PartFacing::Everywhere);
+        let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal, facing };
         part.points[..points.len()].copy_from_slice(points);
         if let [a, b, c] = *points {
             part.normal = Triangle::new([a, b, c]).normal;
         }
         part
-    }
-
-    /// An edge of faces with these normals.
-    fn edge(points: [DVec3; 2], radius: f64, normals: impl Iterator<Item = DVec3> + Clone) -> Self {
-        let normal = normals.clone().map(DVec3::normalize_or_zero).sum::<DVec3>().normalize_or_zero();
-        let cosine = normals.map(|n| n.normalize_or_zero().dot(normal)).fold(1.0, f64::min).max(0.0);
-        Self { normal, cosine, ..Self::new(&points, radius) }
-    }
-
-    /// The normal of the part's plane; zero where it has none.
-    pub fn plane_normal(&self) -> DVec3 {
-        if self.count == 3 { self.normal } else { DVec3::ZERO }
     }
 
     /// The one to three points.
@@ -161,30 +145,6 @@ impl<'a> SurfaceBody<'a> {
         nodes.sort_unstable();
         nodes.dedup();
         nodes
-    }
-
-    /// The edges of the faces in the leaves that can come within `reach`; see
-    /// [`edge`](Self::edge). For a simple shape, all its edges.
-    pub fn edges(&self, field: &FieldBody, reach: &Reach) -> Candidates {
-        match self.shape {
-            Shape::Mesh(asset) => {
-                let mut edges = Vec::new();
-                self.visit_leaves(asset, field, reach, |start, count| {
-                    edges.extend(self.edges_of_leaf(start, count));
-                });
-                edges
-            }
-            _ => self.edges_of_leaf(0, 0),
-        }
-    }
-
-    /// The edges that belong to a leaf of the face tree, or all edges of a simple shape.
-    fn edges_of_leaf(&self, start: u32, count: u32) -> Candidates {
-        let first = self.node_count();
-        match self.shape {
-            Shape::Mesh(asset) => asset.sharp_edges(start, count).map(|edge| first + edge).collect(),
-            simple => Simple::from(simple).edges().map(|edge| first + edge.id).collect(),
-        }
     }
 
     /// A candidate face.
@@ -309,61 +269,6 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// A candidate edge as a part of two points. Its number is that of the nodes + 3 × face + side.
-    pub fn edge(&self, candidate: u32) -> Part {
-        let edge = candidate - self.node_count();
-        let (face, side) = (edge as usize / 3, edge as usize % 3);
-        match self.shape {
-            Shape::Mesh(asset) => {
-                let corners = asset.face_corners(face);
-                let points = [corners[side], corners[(side + 1) % 3]].map(|p| self.to_field(p));
-                let faces = asset.faces_beside(face, side).chain([face]);
-                let [start, end] = [side, (side + 1) % 3].map(|k| asset.local_corners(face)[k]);
-                let middle = 0.5 * (start + end);
-                let normals: Vec<DVec3> =
-                    faces.map(|f| self.linear * asset.outward_normal(f as u32, middle)).collect();
-                Part::edge(points, self.around, normals.into_iter())
-            }
-            simple => {
-                let simple = Simple::from(simple);
-                let radius = simple.radius() * self.scale + self.around;
-                let Some(SimpleEdge { points, normals, .. }) = simple.edges().find(|e| e.id == edge) else {
-                    return Part::new(&[self.shift], radius);
-                };
-                let normals = normals.map(|n| self.linear * n);
-                Part::edge(points.map(|p| self.to_field(p)), radius, normals.into_iter())
-            }
-        }
-    }
-
-    /// A candidate node with the mean of the normals of its faces, which rounded shapes do not
-    /// have.
-    pub fn node_of_faces(&self, node: u32) -> Part {
-        let normal = match self.shape {
-            Shape::Mesh(asset) => {
-                let at = asset.frame.to_local(DVec3::from_array(asset.vertices[node as usize]));
-                let normal = |&face: &u32| asset.outward_normal(face, at);
-                asset.faces_at(node).iter().map(normal).sum()
-            }
-            Shape::Box { .. } => Simple::from(self.shape).node(node).signum(),
-            _ => DVec3::ZERO,
-        };
-        Part { normal: (self.linear * normal).normalize_or_zero(), ..self.node(node) }
-    }
-
-    /// The id of the lowest face that has a candidate edge, and of the edge, in the user's
-    /// numbering.
-    pub fn edge_ids(&self, candidate: u32) -> (u32, u32) {
-        let (first, edge) = (self.node_count(), candidate - self.node_count());
-        let face = self.face_id(edge / 3);
-        (face, first + 3 * face + edge % 3)
-    }
-
-    /// Whether a candidate of the edge mode is an edge, not a node.
-    pub fn is_edge(&self, candidate: u32) -> bool {
-        candidate >= self.node_count()
-    }
-
     /// The id of a face in the user's numbering.
     pub fn face_id(&self, face: u32) -> u32 {
         match self.shape {
@@ -398,14 +303,9 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// Whether a range of faces contains a face, or in node mode a node; in edge mode, a node or
-    /// edge.
+    /// Whether a range of faces contains a face, or in node mode a node.
     pub fn holds(&self, start: u32, count: u32, candidate: u32, mode: Mode) -> bool {
         match (mode, self.shape) {
-            (Mode::Edge, Shape::Mesh(_)) if self.is_edge(candidate) => {
-                (start..start + count).contains(&((candidate - self.node_count()) / 3))
-            }
-            (Mode::Edge, Shape::Mesh(_)) => self.holds(start, count, candidate, Mode::Node),
             (Mode::Node, Shape::Mesh(asset)) => {
                 asset.faces[start as usize..(start + count) as usize].as_flattened().contains(&candidate)
             }
@@ -414,14 +314,9 @@ impl<'a> SurfaceBody<'a> {
     }
 
     /// The candidates of a leaf of the face tree, or of all parts of a simple shape. In node mode,
-    /// a vertex belongs to the leaf of its lowest face, and in edge mode an edge, too.
+    /// a vertex belongs to the leaf of its lowest face.
     pub fn of_leaf(&self, start: u32, count: u32, mode: Mode) -> Candidates {
         match (mode, self.shape) {
-            (Mode::Edge, _) => {
-                let mut both = self.of_leaf(start, count, Mode::Node);
-                both.extend(self.edges_of_leaf(start, count));
-                both
-            }
             (Mode::Node, Shape::Mesh(asset)) => {
                 let lowest = asset.lowest_faces();
                 let of_face = |face: u32| {

@@ -70,8 +70,6 @@ pub enum PolygonVerdict {
     /// Dropped because no direction is in the normal cones of both bodies there, where local minima
     /// are wanted: other places of the bodies meet first.
     OutOfCones,
-    /// The least distance of an edge is at one of its ends, which are contacts as nodes.
-    AtEnd,
 }
 
 /// A face clipped by one cell, a point of a whole face, or a node; in the world's unit and frame.
@@ -92,11 +90,10 @@ pub struct PolygonReport {
     pub verdict: PolygonVerdict,
 }
 
-/// A face of *a*, or a node in node mode; a node or an edge in edge mode.
+/// A face of *a*, or a node in node mode.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartReport {
-    /// The id of the face or node in the user's numbering; of an edge, as
-    /// [`FeatureId::a`](super::FeatureId::a).
+    /// The id of the face or node in the user's numbering.
     pub id: u32,
     /// The part's contact distance, in the world's unit: at most that of the pair. Parts that
     /// hardly move against the other body look less far.
@@ -208,7 +205,6 @@ impl Stages<'_> {
         let surface = &self.pair.surface;
         match self.options.mode {
             Mode::Node => surface.node_count() as usize,
-            Mode::Edge => surface.of_leaf(0, surface.face_count(), Mode::Edge).len(),
             Mode::Face | Mode::Exact => surface.face_count() as usize,
         }
     }
@@ -218,20 +214,11 @@ impl Stages<'_> {
         let total = self.total() as u32;
         let found: Vec<u32> = match self.options.mode {
             Mode::Node => (0..total).filter(|&node| node == id).collect(),
-            Mode::Edge => {
-                let surface = &self.pair.surface;
-                let mut all = surface.of_leaf(0, surface.face_count(), Mode::Edge);
-                all.retain(|&candidate| self.pair.part(candidate).2 == id);
-                all
-            }
             Mode::Face | Mode::Exact => (0..total).filter(|&f| self.pair.surface.face_id(f) == id).collect(),
         };
         if found.is_empty() {
             let (option, expected) = match self.options.mode {
                 Mode::Node => ("node", "a node of the body, counted from 0"),
-                Mode::Edge => {
-                    ("edge", "a node of the body, or the number of an edge that is tested, as in `feature.a`")
-                }
                 Mode::Face | Mode::Exact => {
                     ("face", "a face of the body, counted from 0 as in the encoded mesh")
                 }
@@ -277,12 +264,11 @@ impl Stages<'_> {
                 Err(Dropped::ByCosine(cosine)) => PolygonVerdict::Filtered { cosine },
                 Err(Dropped::Descending) => PolygonVerdict::Descending,
                 Err(Dropped::OutOfCones) => PolygonVerdict::OutOfCones,
-                Err(Dropped::AtEnd) => PolygonVerdict::AtEnd,
                 Ok(_) => PolygonVerdict::Contact,
             };
             kept.push((key(polygon), describe(polygon, &minimum, verdict)));
         });
-        if search.is_whole(&part) && !kept.is_empty() {
+        if search.is_of_faces() && !kept.is_empty() {
             let polygons = kept.into_iter().map(|k| k.1).collect();
             return PartReport { id, contact_distance, broad, polygons };
         }
@@ -296,7 +282,7 @@ impl Stages<'_> {
             };
             polygons.push(describe(polygon, &minimum, verdict));
         });
-        if search.is_whole(&part) {
+        if search.is_of_faces() {
             // Without a limit, the extremes of flat contact are others.
             polygons.truncate(1);
         }

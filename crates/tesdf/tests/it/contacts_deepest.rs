@@ -27,7 +27,7 @@ fn options(contact_distance: f64) -> Vec<CollideOptions> {
     let mut all = Vec::new();
     for cos_theta in [None, Some(0.5)] {
         let base = CollideOptions { contact_distance, cos_theta, ..CollideOptions::default() };
-        all.extend([Mode::Node, Mode::Edge].map(|mode| CollideOptions { mode, ..base }));
+        all.push(CollideOptions { mode: Mode::Node, ..base });
         for mode in [Mode::Face, Mode::Exact] {
             for contacts_per in [ContactsPer::Cell, ContactsPer::Face] {
                 all.push(CollideOptions { mode, contacts_per, ..base });
@@ -169,7 +169,7 @@ fn the_deepest_of_a_nut_and_its_bolt_are_those_of_all() {
         let bodies =
             [Placed::new("iso_m16_bolt_6k", at(DVec3::ZERO)), Placed::new("iso_m16_nut_c100", at(shift))];
         let scene = scene(&bodies);
-        for mode in [Mode::Node, Mode::Edge, Mode::Face, Mode::Exact] {
+        for mode in [Mode::Node, Mode::Face, Mode::Exact] {
             let contacts_per = ContactsPer::Face;
             let of_mode = CollideOptions::with_mode(mode);
             let (all, _) =
@@ -270,7 +270,7 @@ fn many_pairs_have_the_same_contacts_on_any_number_of_threads() {
         let pose = Pose { translation: DVec3::ZERO, rotation };
         scene.add(Instance { world, ..Instance::new(floor, pose) }).expect("a pose");
     }
-    for mode in [Mode::Node, Mode::Edge, Mode::Exact] {
+    for mode in [Mode::Node, Mode::Exact] {
         let contacts_per = ContactsPer::Face;
         let options =
             CollideOptions { contact_distance: 1e-3 * size, contacts_per, ..CollideOptions::with_mode(mode) };
@@ -312,7 +312,7 @@ fn few_contacts_of_a_deep_overlap_take_few_searches() {
         at: Placement { pose: Pose::at(DVec3::new(0.1, 0.2, 2.2)), scale: 1.0 },
     };
     let scene = scene(&[block(DVec3::splat(-2.0), DVec3::splat(2.0), 24), ball]);
-    for mode in [Mode::Node, Mode::Edge, Mode::Exact] {
+    for mode in [Mode::Node, Mode::Exact] {
         let options = CollideOptions { contacts_per: ContactsPer::Face, ..CollideOptions::with_mode(mode) };
         let all = detect(&scene, &options).statistics;
         let looks = [1, 8, 64].map(|count| {
@@ -331,7 +331,7 @@ fn spread_contacts_take_searches_in_proportion_to_their_number() {
     let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
     let bodies = [Placed::new("iso_m16_bolt_6k", at), Placed::new("iso_m16_nut_c100", at)];
     let scene = scene(&bodies);
-    for mode in [Mode::Node, Mode::Edge, Mode::Face, Mode::Exact] {
+    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
         let contacts_per = ContactsPer::Face;
         let base = CollideOptions { contact_distance: 2e-4, contacts_per, ..CollideOptions::with_mode(mode) };
         let all = detect(&scene, &base);

@@ -303,7 +303,6 @@ fn the_same_bytes_on_any_number_of_threads() {
     let scene = scene(&bodies);
     for (mode, contacts_per) in [
         (Mode::Node, ContactsPer::Face),
-        (Mode::Edge, ContactsPer::Face),
         (Mode::Face, ContactsPer::Cell),
         (Mode::Face, ContactsPer::Face),
         (Mode::Exact, ContactsPer::Cell),

@@ -67,7 +67,7 @@ fn depths(asset: &Arc<TeSdf>, top: f64) -> Vec<f64> {
     let probe = scene.add_shape(Body::Box { half_extents: DVec3::splat(0.25) }).expect("room");
     scene.add(Instance::new(body, Pose::IDENTITY)).expect("valid");
     scene.add(Instance::new(probe, Pose::at(DVec3::new(0.1, 0.2, top + 0.15)))).expect("valid");
-    let modes = [Mode::Node, Mode::Edge, Mode::Face, Mode::Exact];
+    let modes = [Mode::Node, Mode::Face, Mode::Exact];
     modes
         .into_iter()
         .map(|mode| {
@@ -260,7 +260,7 @@ fn check_contacts(asset: &Arc<TeSdf>, solid: &SolidMesh, shift: DVec3) -> Result
         let placed = if instance == InstanceId(0) { p } else { p - shift };
         reference.signed_distance(placed)
     };
-    for mode in [Mode::Node, Mode::Edge, CollideOptions::default().mode] {
+    for mode in [Mode::Node, CollideOptions::default().mode] {
         let options = CollideOptions { mode, ..CollideOptions::default() };
         let found = detect(&scene, &options).expect("valid");
         for contact in &found {

@@ -255,7 +255,7 @@ fn a_box_in_a_void_has_contacts_clearance_and_impact_of_formulas() {
         let impact = time_of_impact(&scene, moved, walls, right, Motion::Rest, &options);
         let impact = *impact.expect("an answer").impact().expect("an impact");
         assert!((impact.time - 0.05).abs() < 1e-5, "{impact:?}");
-        for mode in [Mode::Node, Mode::Edge, Mode::Face, Mode::Exact] {
+        for mode in [Mode::Node, Mode::Face, Mode::Exact] {
             let contacts_per = ContactsPer::Face;
             let options = CollideOptions {
                 contact_distance: 0.06,

@@ -1,4 +1,5 @@
 //! The tests of `tesdf` over several of its modules, in one program.
+mod bars_and_needles;
 mod batch_columns;
 mod cad;
 mod certified_cells;
@@ -8,7 +9,6 @@ mod conforming_mesh;
 mod contact_patches;
 mod contacts_brute_force;
 mod contacts_deepest;
-mod contacts_edges;
 mod contacts_exact;
 mod contacts_hidden;
 mod contacts_none_lost;

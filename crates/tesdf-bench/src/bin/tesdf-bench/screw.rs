@@ -43,7 +43,6 @@ pub struct Args {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Mode {
     Node,
-    Edge,
     Face,
     Exact,
     Off,
@@ -101,7 +100,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         for &mode in &args.modes {
             loaded.scene.detector.mode = match mode {
                 Mode::Node => DetectorMode::Node,
-                Mode::Edge => DetectorMode::Edge,
                 Mode::Face => DetectorMode::Face,
                 Mode::Exact => DetectorMode::Exact,
                 Mode::Off => DetectorMode::Off,

@@ -69,7 +69,6 @@ fn name(mode: DetectorMode) -> &'static str {
         DetectorMode::Exact => "exact",
         DetectorMode::Face => "face",
         DetectorMode::Node => "node",
-        DetectorMode::Edge => "edge",
         DetectorMode::Off => "off",
     }
 }

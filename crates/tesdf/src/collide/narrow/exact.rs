@@ -182,30 +182,6 @@ pub struct Query<'a> {
 }
 
 impl<'a> Query<'a> {
-    /// A segment in the whole field, which has no list: `none`.
-    pub fn of_segment(
-        around: &'a Surroundings<'a>,
-        none: &'a Faces,
-        polygon: &'a Polygon,
-        tolerance: f64,
-        reach: f64,
-    ) -> Self {
-        let center = polygon.center();
-        Self {
-            asset: around.asset,
-            around: Some(around),
-            place: Place::NotOfDomain,
-            faces: none,
-            polygon,
-            normal: DVec3::ZERO,
-            center,
-            radius: polygon.reach(center),
-            tolerance,
-            slack: 0.0,
-            reach,
-        }
-    }
-
     /// A polygon in a field; `none` is the list of the whole field. `None` for a simple shape.
     pub fn of_cell(
         cell: &'a CellField<'a>,
@@ -338,25 +314,6 @@ impl<'a> Query<'a> {
             Parts::Across(above, below) => Some((above, below)),
             Parts::Above | Parts::Below => None,
         }
-    }
-
-    /// The places where a segment touches faces or passes through them, from 0 at its start to 1 at
-    /// its end, in order, each with a face.
-    pub fn crossings(&self) -> Vec<(f64, u32)> {
-        let points = &self.points();
-        let way = points[points.len() - 1] - points[0];
-        let mut crossings = Vec::new();
-        self.near(CLEAR, &mut |face| {
-            if !self.plane_is_beyond(points, face, CLEAR) {
-                let triangle = self.asset.local_triangle(face as usize);
-                let nearest = polygon_to_triangle(points, self.normal, &triangle, CLEAR);
-                crossings
-                    .extend(nearest.map(|(_, at)| (way.dot(at - points[0]) / way.length_squared(), face)));
-            }
-            CLEAR
-        });
-        crossings.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        crossings
     }
 
     /// Whether the polygon, which is `distance` from the surface at `point`, only touches it along

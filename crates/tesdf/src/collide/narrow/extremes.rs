@@ -60,7 +60,7 @@ pub struct Patch<'a> {
     limit: f64,
     /// Where the patch can be: the part, or a chord of it.
     within: ArrayVec<DVec3, 3>,
-    /// The normal of `within`; zero for a chord or an edge.
+    /// The normal of `within`; zero for a chord.
     normal: DVec3,
     /// The normal of the part on the side that touches.
     facing: DVec3,
@@ -99,7 +99,7 @@ impl<'a> Patch<'a> {
         let is_large = search.is_large(part);
         let Search { tolerance, reach, .. } = *search;
         let limit = if is_large { reach + part.radius } else { minimum.value.distance + tolerance };
-        let normal = part.plane_normal();
+        let normal = part.normal;
         // A normal that may be that of the other side is turned against the gradient.
         let is_turned = part.facing == PartFacing::AtCenter && minimum.value.gradient.dot(part.normal) > 0.0;
         let facing = if is_turned { -part.normal } else { part.normal };
@@ -195,12 +195,7 @@ impl<'a> Patch<'a> {
     /// Whether a candidate may be in the patch and matters beside the minimum.
     fn may_hold(&self, p: DVec3) -> bool {
         let from = p - self.minimum.point;
-        let beside = match (self.normal == DVec3::ZERO, self.is_large && self.part.normal != DVec3::ZERO) {
-            (false, _) => 0.0,
-            (true, false) => SMALL * self.longest.length(),
-            // A large edge, whose ends on the other body must hold it up.
-            (true, true) => self.search.tolerance,
-        };
+        let beside = if self.normal == DVec3::ZERO { SMALL * self.longest.length() } else { 0.0 };
         from.length_squared() > beside * beside && (self.is_large || self.is_level(from))
     }
 
@@ -255,11 +250,8 @@ impl<'a> Patch<'a> {
     fn take(&self, point: DVec3, corner: Option<u8>) -> Option<Minimum> {
         let normal = self.facing;
         let value = |p: DVec3| self.field.opposing(p, normal, self.search.precision);
-        // The normal of an edge is oblique to its faces, and the other body may oppose either of
-        // them.
-        let opposes = OPPOSES * self.part.cosine;
         let holds = |v: &FieldValue| {
-            v.distance <= self.limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < opposes)
+            v.distance <= self.limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < OPPOSES)
         };
         let minimum = |point, value, corner| Minimum {
             point,
@@ -270,7 +262,7 @@ impl<'a> Patch<'a> {
             is_lowest: false,
         };
         // From the nearest point of the other body, along the face.
-        let offset = |p: DVec3, v: &FieldValue| self.along_part(p - v.closest_point);
+        let offset = |p: DVec3, v: &FieldValue| self.along_face(p - v.closest_point);
         let is_over = |p, v: &FieldValue| v.feature == Feature::Face || offset(p, v).length() < HEIGHT;
         let first = value(point);
         let taken = holds(&first).then(|| minimum(point, first, corner));
@@ -284,7 +276,7 @@ impl<'a> Patch<'a> {
         let (mut at, mut moved) = (first, point);
         for _ in 0..MOVES {
             let missing = at.distance + depth;
-            let gradient = self.along_part(at.gradient);
+            let gradient = self.along_face(at.gradient);
             let (outward, slope) = match at.distance < 0.0 {
                 true => (gradient, gradient.length()),
                 // The gradient on the surface does not say on which side of an edge the point lies.
@@ -306,15 +298,12 @@ impl<'a> Patch<'a> {
         taken
     }
 
-    /// The component of a vector in the plane of a face, or along an edge.
-    fn along_part(&self, v: DVec3) -> DVec3 {
-        match self.part.points() {
-            [_, _] => v.project_onto_normalized(self.longest.normalize_or_zero()),
-            _ => v.reject_from_normalized(self.part.normal),
-        }
+    /// The component of a vector in the plane of the face.
+    fn along_face(&self, v: DVec3) -> DVec3 {
+        v.reject_from_normalized(self.part.normal)
     }
 
-    /// Whether a point lies over the face, or on it, or on the edge.
+    /// Whether a point lies over the face, or on it.
     fn holds(&self, p: DVec3) -> bool {
         self.sides.iter().all(|side| side.inward.dot(p - side.start) >= side.least)
     }
@@ -408,13 +397,9 @@ impl<'a> Patch<'a> {
     }
 }
 
-/// The sides of a part that is a triangle, or the ends of an edge.
+/// The sides of a part that is a triangle.
 fn sides(part: &Part) -> [Side; 3] {
-    let &[a, b, c] = part.points() else {
-        let &[a, b] = part.points() else { return Default::default() };
-        let end = |start, inward: DVec3| Side { start, inward, least: -HEIGHT * inward.length() };
-        return [end(a, b - a), end(b, a - b), Side::default()];
-    };
+    let &[a, b, c] = part.points() else { return Default::default() };
     [(a, b), (b, c), (c, a)].map(|(start, end)| {
         let edge = end - start;
         Side { start, inward: part.normal.cross(edge), least: -HEIGHT * edge.length() }

@@ -4,7 +4,6 @@ mod exact;
 pub mod extremes;
 mod frank_wolfe;
 pub mod jump;
-mod segment;
 
 use glam::DVec3;
 
@@ -74,8 +73,7 @@ impl Search {
         let unit = field.unit();
         let tolerance = options.tolerance.resolve(diagonals[1]) / unit;
         let large = LARGE * diagonals[0].min(diagonals[1]) / unit;
-        let CollideOptions { mode, contacts_per, iterations, precision, .. } = *options;
-        let per = if mode == Mode::Edge { ContactsPer::Face } else { contacts_per };
+        let CollideOptions { mode, contacts_per: per, iterations, precision, .. } = *options;
         Self { mode, per, iterations, large, reach: reach / unit, tolerance, precision }
     }
 
@@ -137,15 +135,9 @@ impl Search {
         edges.fold(0.0, f64::max) > self.large * self.large
     }
 
-    /// Whether parts other than nodes are searched as a whole, not cell by cell.
+    /// Whether parts are searched as a whole, not cell by cell.
     pub fn is_of_faces(&self) -> bool {
         self.per != ContactsPer::Cell && self.mode != Mode::Node
-    }
-
-    /// Whether a part is searched as a whole.
-    pub fn is_whole(&self, part: &Part) -> bool {
-        let is_node = self.mode == Mode::Edge && part.points().len() == 1;
-        self.is_of_faces() && !is_node
     }
 
     /// The mesh around parts that lie near each other, for [`minima`](Self::minima). `None` where
@@ -178,7 +170,7 @@ impl Search {
         polygon: &mut impl FnMut(&ClippedPolygon),
         found: &mut impl FnMut(&ClippedPolygon, Minimum),
     ) {
-        if self.is_whole(part) {
+        if self.is_of_faces() {
             return match (around, field.field) {
                 (Some(around), _) => self.of_face(&CellField::Whole(around), part, polygon, found),
                 (None, Field::Mesh(asset)) => {
@@ -236,45 +228,18 @@ impl Search {
         let reach = self.reach + part.radius;
         let Some(minimum) = self.in_cell(everywhere, &whole, part, reach) else { return };
         let extremes = Patch::new(everywhere, part, &minimum, self).extremes();
-        if self.mode != Mode::Edge || !self.is_between(part, &minimum, &extremes) {
-            found(&whole, self.at_end(part, minimum));
-        }
-        extremes.into_iter().for_each(|extreme| found(&whole, self.at_end(part, extreme)));
-    }
-
-    /// Whether an edge is as low, within the tolerance, at points on both sides of its minimum. The
-    /// contacts there hold a body as well.
-    fn is_between(&self, part: &Part, minimum: &Minimum, extremes: &[Minimum]) -> bool {
-        let &[start, end] = part.points() else { return false };
-        let is_low = |m: &&Minimum| m.value.distance <= minimum.value.distance + self.tolerance;
-        let way = |m: &Minimum| (end - start).dot(m.point - minimum.point);
-        let mut ways = extremes.iter().filter(is_low).map(way);
-        ways.clone().any(|way| way < 0.0) && ways.any(|way| way > 0.0)
-    }
-
-    /// A minimum of an edge within the tolerance of an end is there.
-    fn at_end(&self, part: &Part, minimum: Minimum) -> Minimum {
-        if self.mode != Mode::Edge {
-            return minimum;
-        }
-        let is_near = |end: &DVec3| end.distance(minimum.point) <= self.tolerance;
-        let corner = part.points().iter().position(is_near).map(|k| k as u8);
-        Minimum { corner, ..minimum }
+        found(&whole, minimum);
+        extremes.into_iter().for_each(|extreme| found(&whole, extreme));
     }
 
     /// The lowest point of a polygon of a part, within the tolerance.
     fn exact(&self, cell: &CellField, polygon: &Polygon, part: &Part, reach: f64) -> Option<Lowest> {
         let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
-        let normal = part.plane_normal();
+        let normal = part.normal;
         if let Some(jump) = cell.jump() {
             return jump::lowest(jump, cell, polygon, normal, (self.tolerance, reach), precision);
         }
-        match (self.mode, cell, part.points()) {
-            (Mode::Edge, CellField::Whole(around), &[start, end]) => {
-                segment::lowest(around, [start, end], self.tolerance, reach, precision)
-            }
-            _ => exact::lowest(cell, polygon, normal, self.tolerance, reach, precision),
-        }
+        exact::lowest(cell, polygon, normal, self.tolerance, reach, precision)
     }
 
     fn in_cell(
@@ -292,7 +257,7 @@ impl Search {
             Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None }),
             // Steps along the gradient do not see what is beyond a jump.
             Mode::Face if cell.jump().is_none() => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
-            Mode::Face | Mode::Edge | Mode::Exact => self.exact(cell, polygon, part, reach),
+            Mode::Face | Mode::Exact => self.exact(cell, polygon, part, reach),
         }?;
         let Lowest { point, converged, face } = lowest;
         let normal = part.normal;
