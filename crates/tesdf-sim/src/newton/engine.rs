@@ -615,18 +615,22 @@ impl Newton {
         let mut later: Option<Vec<Row>> = None;
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut plain = Motion::new(&step.free, &step.target);
-        let kept = self.kept.of(&first);
-        let guess = Guess { velocities: &start, forces: kept.as_deref() };
-        let (mut velocities, mut forces) = self.solve(step, &plain, &first, Gap::Position, guess);
         let count = step.free.len();
         let loads =
             |rows: &[Row], forces: &[RowForce]| Loads::new(count, rows, forces, rows.len() - joints.len());
         let from = Start { velocities: &start, h: step.h, whole: step.whole };
         let mut found_at = vec![Vector6::zeros(); count];
+        let kept = self.kept.of(&first);
+        let of_kept =
+            kept.as_deref().and_then(|kept| plain.stiffened(&loads(&first, kept), &found_at, &from));
+        let motion = of_kept.as_ref().unwrap_or(&plain);
+        let guess = Guess { velocities: &start, forces: kept.as_deref() };
+        let (mut velocities, mut forces) = self.solve(step, motion, &first, Gap::Position, guess);
         let mut stiffened = plain.stiffened(&loads(&first, &forces), &found_at, &from);
-        if let Some(motion) = &stiffened {
+        let again = stiffened.as_ref().unwrap_or(&plain);
+        if again.differs(motion, &plain) {
             (velocities, forces) =
-                self.solve(step, motion, &first, Gap::Position, from_last(&velocities, &forces));
+                self.solve(step, again, &first, Gap::Position, from_last(&velocities, &forces));
         }
         // The contacts at which bodies are hit, found where they are hit.
         let mut held: Vec<Row> = Vec::new();

@@ -135,6 +135,14 @@ impl Motion {
         is_stiffer.then_some(motion)
     }
 
+    /// Whether the stiffness of a body differs from that of `other` by as much as matters; `plain` is
+    /// the motion without it.
+    pub fn differs(&self, other: &Self, plain: &Self) -> bool {
+        let size = |m: &Matrix6<f64>| m.fixed_view::<3, 3>(3, 3).trace();
+        let sizes = self.inertia.iter().zip(&other.inertia).zip(&plain.inertia);
+        sizes.into_iter().any(|((a, b), m)| (size(a) - size(b)).abs() > OF_JOINTS * size(m))
+    }
+
     /// Adds `½ added |ω − around|²` of body `k`. Two squares around different velocities are, up to
     /// a constant, one square around their mean.
     fn hold(&mut self, k: usize, added: f64, around: &Vector6<f64>) -> bool {

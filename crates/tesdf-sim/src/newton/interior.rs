@@ -116,6 +116,9 @@ const CORRECTED_FROM: f64 = 1e-6;
 
 /// From forces that are nearly right, ν begins with this multiple of what they are off.
 const FIRST_WARM: f64 = 10.0;
+/// Forces are nearly right when they are off by less, m. Bodies that hit each other may have several
+/// solutions with friction: which one they find must not depend on what acted before.
+const NEARLY: f64 = 1e-4;
 /// The least gap as which they may be off, m.
 const LEAST_WARM: f64 = 1e-9;
 
@@ -141,8 +144,9 @@ impl Interior<'_> {
 
     fn iterate(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Forces>)>) -> Solution {
         let mut iterations = 0;
-        if let Some((velocity, forces)) = guess {
-            let centre = self.centre_of(&velocity, &forces);
+        if let Some((velocity, forces)) = guess
+            && let Some(centre) = self.centre_of(&velocity, &forces)
+        {
             let found = Iterate::from(self, velocity, &forces, centre).descend(Limits::Coulomb, WARM);
             iterations += found.iterations;
             if found.converged {
@@ -296,8 +300,9 @@ impl Interior<'_> {
     }
 
     /// ν for velocities and forces that are nearly right: that of the gaps that are left where a
-    /// force is within its bounds, and of the ways by which forces are off.
-    fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> f64 {
+    /// force is within its bounds, and of the ways by which forces are off. Returns `None` where
+    /// these are not nearly right.
+    fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> Option<f64> {
         let (mut products, mut count, mut worst) = (0.0, 0.0, LEAST_WARM);
         for (k, bundle, relative) in self.bundles(velocity) {
             let push = forces[k].push;
@@ -313,7 +318,8 @@ impl Interior<'_> {
                 worst = f64::max(worst, off.abs() / bundle.scale.0[lane]);
             }
         }
-        FIRST_WARM * f64::max(products / f64::max(count, 1.0), self.mean_square(worst))
+        let centre = FIRST_WARM * (products / f64::max(count, 1.0)).max(self.mean_square(worst));
+        (worst < NEARLY).then_some(centre)
     }
 }
 
