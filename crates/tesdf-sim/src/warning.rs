@@ -1,7 +1,6 @@
 //! What a run did not do as its scene asks: warnings for users.
 use serde::{Deserialize, Serialize};
-use tesdf::Length;
-use tesdf::collide::{ClearanceOptions, CollideError, InstancePair, clearance, instance_pairs};
+use tesdf::collide::{CollideError, InstancePair, PenetrationOptions, deepest_penetration, instance_pairs};
 
 use crate::criterion::JointDrift;
 use crate::scene_file::{DetectorMode, SceneFile};
@@ -196,10 +195,10 @@ impl Watch {
             if bound <= 0.0 || !(is_free(a) || is_free(b)) {
                 continue;
             }
-            let options = ClearanceOptions { tolerance: Length::Absolute(TOLERANCE * bound) };
-            let depth = -clearance(scene, first, second, &options)?.distance;
-            if depth > bound {
-                found.push(([a, b], depth));
+            let options = PenetrationOptions { above: bound, tolerance: TOLERANCE * bound };
+            let measured = deepest_penetration(scene, &[[first, second]], &options)?;
+            if let Some((_, clearance)) = measured.deepest {
+                found.push(([a, b], -clearance.distance));
             }
         }
         Ok(found)
