@@ -13,6 +13,7 @@ fuzz_target!(|data: &[u8]| {
         }
     }
     record.contacts().take(64).for_each(drop);
+    assert!(record.warnings().iter().all(|warning| warning.count > 0));
     record.nearest_step(0.5);
     record.nearest_contacts(0.5);
 });

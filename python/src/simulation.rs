@@ -125,7 +125,8 @@ impl Simulation {
     /// hold the interpreter's lock.
     pub fn so_far(&self) -> (RunRecord, System) {
         let running = self.locked();
-        (running.run.record().clone(), running.engine.system().clone())
+        let system = running.engine.system();
+        (running.run.clone().into_record(system), system.clone())
     }
 
     fn pool(&self, py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
@@ -271,13 +272,14 @@ impl Simulation {
 
     /// Writes the run file of the steps so far, with the bytes of that of the command.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let saved = self.read(py, |r| r.run.clone().into_record().save(&path));
+        let saved = self.read(py, |r| r.run.clone().into_record(r.engine.system()).save(&path));
         saved.map_err(|e| Error::Record(path, e).raise(py))
     }
 
-    /// All states so far, and recorded contacts: Record(times, poses, velocities, ...), copied.
+    /// All states so far, recorded contacts and warnings: Record(times, poses, velocities, ...),
+    /// copied.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let record = self.read(py, |r| r.run.record().clone());
+        let record = self.read(py, |r| r.run.clone().into_record(r.engine.system()));
         let (steps, bodies) = (record.times().len(), record.bodies.len());
         let each = || (0..steps).flat_map(|step| (0..bodies).map(move |body| (step, body)));
         let poses = each().filter_map(|(step, body)| record.pose(step, body)).flat_map(|p| of_pose(&p));
@@ -300,6 +302,7 @@ impl Simulation {
             .add("distances", all().map(|c| c.distance))?
             .add_rows("bodies", all().map(|c| c.bodies))?
             .add_rows("faces", all().map(|c| c.faces))?
+            .with("warnings", classes::dict(py, &record.warnings())?)?
             .build("Record")
     }
 

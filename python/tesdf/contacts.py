@@ -310,3 +310,5 @@ class Record(_Rows):
     """[R, 2] the body of the face, and the body of the field"""
     faces: _Id
     """[R, 2] face of a, and face of b"""
+    warnings: list[dict[str, Any]]
+    """what the steps did not do as the scene asks, as `warnings` of `summary()`"""

@@ -92,6 +92,12 @@ def test_what_a_run_does_not_do_is_told(scene, tmp_path):
     overlap = told[0]
     assert overlap["kind"] == "overlap" and overlap["value"] > 4e-3 and "box" in overlap["names"]
     assert simulation.warnings == [warning["message"] for warning in told] and "at the end" in overlap["message"]
+    assert overlap["time"] == pytest.approx(simulation.time) and simulation.record().warnings == told
+    # The page has them from the simulation and from its file.
+    simulation.save(tmp_path / "run.tesrun")
+    for name, run in [("simulation", simulation), ("file", tmp_path / "run.tesrun")]:
+        tesdf.view(run, tmp_path / f"{name}.html", contacts=0)
+        assert json.dumps(overlap["message"]) in (tmp_path / f"{name}.html").read_text()
 
 
 def test_options(scene):

@@ -26,7 +26,10 @@
 //!
 //! The metadata has one key, `tesdf_run`. Its value is JSON with `version`, `bodies` (names),
 //! `scene` (the scene as JSON) and `folder`, the folder that the scene's paths are relative to. A
-//! run that was saved before its end also has `planned`, its planned number of steps.
+//! run that was saved before its end also has `planned`, its planned number of steps. A run that
+//! did not do all that its scene asks has `warnings`: at most one [`Warning`] of each kind, with the
+//! keys `kind`, `names`, `time` (of the first, s), `value` (the worst), `count` and `message`. Those
+//! of the kind `hidden` are not among them: they follow from the `hidden.…` tensors.
 //!
 //! A run grows as a journal of steps under its final name. At the end the complete file replaces
 //! the journal. [`RunRecord::open`] reads both. [`InterruptedRun`] reads a journal to resume the
@@ -34,6 +37,7 @@
 mod hidden;
 mod journal;
 mod origin;
+mod told;
 
 use std::collections::{HashMap, TryReserveError};
 use std::ops::Range;
@@ -46,15 +50,15 @@ use tesdf::glam::{DQuat, DVec3};
 use tesdf::input;
 use tesdf::save::{SaveError, save_atomic};
 
-use crate::{State, System};
+use crate::{State, System, Warning};
 
 pub use hidden::HiddenPair;
 use hidden::HiddenRows;
 pub use journal::{InterruptedRun, RunJournal};
 pub use origin::RunOrigin;
 
-/// The format version that this build writes and reads.
-pub const RUN_VERSION: u32 = 1;
+/// The version of complete runs and journals that this build writes and reads.
+pub const RUN_VERSION: u32 = 3;
 const KEY: &str = "tesdf_run";
 
 /// States of all bodies over time, and the contacts of some steps.
@@ -78,6 +82,8 @@ pub struct RunRecord {
     distances: Vec<f32>,
     ids: Vec<[u32; 4]>,
     hidden: HiddenRows,
+    /// Warnings, without those of hidden overlaps.
+    told: Vec<Warning>,
 }
 
 /// A contact as a run file stores it.
@@ -157,6 +163,9 @@ struct About {
     folder: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     planned: Option<u64>,
+    /// Without those of hidden overlaps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    warnings: Vec<Warning>,
 }
 
 impl RunRecord {
@@ -169,9 +178,17 @@ impl RunRecord {
     }
 
     /// An empty record, without the state at the beginning.
-    fn of_about(about: About) -> Self {
-        let About { bodies, scene, folder, planned, .. } = about;
-        Self { bodies, scene, folder, planned, contact_starts: vec![0], ..Self::default() }
+    ///
+    /// # Errors
+    /// [`RecordError::Version`], or a warning that cannot be.
+    fn of_about(about: About) -> Result<Self, RecordError> {
+        let About { version, bodies, scene, folder, planned, warnings } = about;
+        if version != RUN_VERSION {
+            return Err(RecordError::Version { found: version, reads: RUN_VERSION });
+        }
+        told::check(&warnings, &bodies).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
+        let contact_starts = vec![0];
+        Ok(Self { bodies, scene, folder, planned, contact_starts, told: warnings, ..Self::default() })
     }
 
     fn about(&self) -> About {
@@ -181,6 +198,7 @@ impl RunRecord {
             scene: self.scene.clone(),
             folder: self.folder.clone(),
             planned: self.planned,
+            warnings: self.told.clone(),
         }
     }
 
@@ -357,13 +375,11 @@ impl RunRecord {
         let (_, header) = SafeTensors::read_metadata(bytes)?;
         let about = header.metadata().as_ref().and_then(|m| m.get(KEY));
         let about = about.ok_or_else(|| RecordError::NotARun(format!("the metadata has no {KEY}")))?;
-        let About { version, bodies, scene, folder, planned } =
+        let about: About =
             serde_json::from_str(about).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
-        if version != RUN_VERSION {
-            return Err(RecordError::Version { found: version, reads: RUN_VERSION });
-        }
+        let empty = Self::of_about(about)?;
         let file = SafeTensors::deserialize(bytes)?;
-        let count = bodies.len();
+        let count = empty.bodies.len();
         let times: Vec<f64> = values(&file, "times", Dtype::F64, &[])?;
         let hidden = match file.tensor("hidden.steps") {
             Ok(_) => HiddenRows {
@@ -384,10 +400,7 @@ impl RunRecord {
             ids: values(&file, "contacts.ids", Dtype::U32, &[4])?,
             hidden,
             times,
-            bodies,
-            scene,
-            folder,
-            planned,
+            ..empty
         };
         record.check()?;
         Ok(record)

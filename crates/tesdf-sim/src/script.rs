@@ -126,17 +126,27 @@ impl Scripts {
                     engine.set_state(*body, State { linear, angular, ..state })?;
                 }
                 Values::Wrenches { body, wrenches } => {
-                    let wrench = track.at(time, wrenches, |a: Wrench, b: Wrench, s| Wrench {
-                        force: a.force.lerp(b.force, s),
-                        torque: a.torque.lerp(b.torque, s),
-                    });
-                    engine.set_wrench(*body, wrench)?;
+                    engine.set_wrench(*body, track.wrench(wrenches, time))?
                 }
                 Values::Targets { joint, motor, targets } => {
-                    // A position is reached at the end of the step.
-                    let at = if matches!(motor.drive, Drive::Position(_)) { time + h } else { time };
-                    let target = track.at(at, targets, |a: f64, b: f64, s| a + (b - a) * s);
-                    engine.set_motor(*joint, Some(with_target(*motor, target)))?;
+                    engine.set_motor(*joint, Some(track.motor(*motor, targets, time, h)))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the wrenches and motors of `system` for the step from `time` to `time + h`, whose states
+    /// are known.
+    pub(crate) fn load(&self, system: &mut System, time: f64, h: f64) -> Result<(), DynamicsError> {
+        for track in &self.0 {
+            match &track.values {
+                Values::Poses { .. } => {}
+                Values::Wrenches { body, wrenches } => {
+                    system.set_wrench(*body, track.wrench(wrenches, time))?
+                }
+                Values::Targets { joint, motor, targets } => {
+                    system.set_motor(*joint, Some(track.motor(*motor, targets, time, h)))?;
                 }
             }
         }
@@ -145,6 +155,20 @@ impl Scripts {
 }
 
 impl Track {
+    fn wrench(&self, wrenches: &[Wrench], time: f64) -> Wrench {
+        self.at(time, wrenches, |a: Wrench, b: Wrench, s| Wrench {
+            force: a.force.lerp(b.force, s),
+            torque: a.torque.lerp(b.torque, s),
+        })
+    }
+
+    /// The motor in the step from `time` to `time + h`.
+    fn motor(&self, motor: Motor, targets: &[f64], time: f64, h: f64) -> Motor {
+        // A position is reached at the end of the step.
+        let at = if matches!(motor.drive, Drive::Position(_)) { time + h } else { time };
+        with_target(motor, self.at(at, targets, |a: f64, b: f64, s| a + (b - a) * s))
+    }
+
     fn at<T: Copy>(&self, time: f64, values: &[T], between: impl Fn(T, T, f64) -> T) -> T {
         // There is at least one keyframe.
         let after = self.times.partition_point(|&t| t <= time);

@@ -1,5 +1,6 @@
 //! Simulates a scene over its duration.
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -11,7 +12,7 @@ use crate::criterion::{
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
 use crate::warning::{Warning, Watch, energies};
-use crate::{Dynamics, DynamicsError, HiddenPair, Residual, RunRecord, StepReport, System};
+use crate::{Dynamics, DynamicsError, HiddenPair, Residual, RunRecord, State, StepReport, System};
 
 /// The state of a run after a step.
 #[derive(Clone, Copy, Debug)]
@@ -183,7 +184,7 @@ pub fn simulate_from(
         }
     }
     let summary = run.summary(engine.system());
-    Ok((run.into_record(), summary))
+    Ok((run.into_record(engine.system()), summary))
 }
 
 /// A run that is made step by step. [`simulate_from`] makes all steps.
@@ -202,6 +203,8 @@ pub struct Run {
     steps: u64,
     /// Contacts are recorded every so many steps; 0 records none.
     contacts_every: u64,
+    /// The first states since the last step whose overlaps were measured, and what they were.
+    overlap: OnceLock<(Vec<State>, Option<Warning>)>,
 }
 
 impl Run {
@@ -225,6 +228,11 @@ impl Run {
         let mut watch = Watch::new(scene, &system);
         for step in 1..=record.steps() {
             let before = energies(&system);
+            // Whether something does work decides what is told of the energy.
+            let begin = (step - 1) as f64 * scene.time_step;
+            scripts
+                .load(&mut system, begin, scene.time_step)
+                .map_err(|source| SimulateError::Step { step, source })?;
             show(&mut system, step)?;
             trackers.observe(&system, scene.time_step);
             watch.observe(&system, before, step as f64 * scene.time_step);
@@ -242,6 +250,7 @@ impl Run {
             time_step: scene.time_step,
             steps,
             contacts_every,
+            overlap: OnceLock::new(),
         })
     }
 
@@ -289,6 +298,8 @@ impl Run {
         self.watch.observe(system, before, time);
         self.totals.add(&report);
         self.record.push_hidden(step, engine.hidden(), system);
+        self.record.tell(self.watch.so_far(system, &self.totals));
+        self.overlap = OnceLock::new();
         Ok(Moment { step: step + 1, steps: self.steps, time, report, system, record: &self.record })
     }
 
@@ -307,12 +318,35 @@ impl Run {
         &self.record
     }
 
-    /// All states so far, without the rest of the run. With all steps made, the record is complete.
-    pub fn into_record(mut self) -> RunRecord {
+    /// All states so far, without the rest of the run, and the warnings of
+    /// [`summary`](Self::summary). With all steps made, the record is complete. `system` is that of
+    /// the engine after the last step.
+    pub fn into_record(mut self, system: &System) -> RunRecord {
+        let told = self.told(system);
+        self.record.tell(told);
         if self.is_complete() {
             self.record.plan(None);
         }
         self.record
+    }
+
+    /// The warnings, without those of hidden overlaps.
+    fn told(&self, system: &System) -> Vec<Warning> {
+        let mut told: Vec<Warning> = self.overlap(system).into_iter().collect();
+        told.extend(self.watch.so_far(system, &self.totals));
+        told
+    }
+
+    /// The warning of overlaps at the end. It is measured once after each step, unless the caller
+    /// moves bodies in between.
+    fn overlap(&self, system: &System) -> Option<Warning> {
+        let time = self.record.steps() as f64 * self.time_step;
+        let measure = || (system.states().to_vec(), self.watch.overlap(system, time));
+        let (states, overlap) = self.overlap.get_or_init(measure);
+        match states == system.states() {
+            true => overlap.clone(),
+            false => measure().1,
+        }
     }
 
     /// Summary of the steps so far. `system` is that of the engine after the last step.
@@ -326,6 +360,8 @@ impl Run {
         let sums = self.totals.summary();
         let depths = hidden.iter().map(|pair| pair.depth);
         let (momentum, angular_momentum) = system.momentum();
+        let mut warnings = self.record.hidden_warnings(&hidden);
+        warnings.extend(self.told(system));
         Summary {
             momentum: momentum.to_array(),
             angular_momentum: angular_momentum.to_array(),
@@ -343,7 +379,7 @@ impl Run {
             hoist,
             transmission,
             assembly,
-            warnings: self.watch.warnings(system, &self.totals, &hidden, self.time_step),
+            warnings,
             deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
             hidden,
             ..sums

@@ -1,12 +1,11 @@
 //! What a run did not do as its scene asks: warnings for users.
-use serde::Serialize;
-use tesdf::Length;
-use tesdf::collide::{ClearanceOptions, CollideError, InstancePair, clearance, instance_pairs};
+use serde::{Deserialize, Serialize};
+use tesdf::collide::{CollideError, InstancePair, PenetrationOptions, deepest_penetration, instance_pairs};
 
 use crate::criterion::JointDrift;
 use crate::scene_file::{DetectorMode, SceneFile};
 use crate::simulate::Totals;
-use crate::{HiddenPair, Joint, Mass, Residual, System};
+use crate::{HiddenPair, Mass, Residual, System};
 
 /// Joints that come farther apart than this fraction of the diagonal of their child are told.
 const APART: f64 = 1e-3;
@@ -25,7 +24,7 @@ const VISIBLE: f64 = 1e-3;
 const TOLERANCE: f64 = 0.1;
 
 /// What a [`Warning`] is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WarningKind {
     /// Bodies overlapped, and no contact showed it. The value is a lower bound of the depth, m.
@@ -42,12 +41,16 @@ pub enum WarningKind {
 
 /// What a run did not do as its scene asks. There is one of each kind but
 /// [`Hidden`](WarningKind::Hidden), of which there is one for each pair.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Warning {
     /// What it is about.
     pub kind: WarningKind,
     /// The bodies, or the joint, with the greatest value.
     pub names: Vec<String>,
+    /// When it was first so, s: the time of the state, or of the beginning of the step. An overlap
+    /// is measured at the end only.
+    pub time: f64,
     /// How much, as the kind says.
     pub value: f64,
     /// Number of pairs of bodies, of joints, or of steps.
@@ -62,18 +65,26 @@ pub(crate) struct Watch {
     /// `None` where detection is off: a depth from which an overlap is told, as a fraction of the
     /// diagonal of the smaller body.
     deep: Option<f64>,
-    /// For each joint: how far it came apart, m and rad, and when it was farthest, s.
+    /// For each joint: how far it came apart.
     joints: Vec<Apart>,
     energy: Energy,
     /// Diagonals of the bodies, m.
     sizes: Vec<f64>,
+    /// Duration of a step, s.
+    time_step: f64,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Apart {
+    /// The greatest distance and angle so far, m and rad.
     distance: f64,
     angle: f64,
+    /// When the distance was greatest, s.
     time: f64,
+    /// The greater of both, as a multiple of that from which on a joint is told.
+    share: f64,
+    /// When that was first above 1, s.
+    first: Option<f64>,
 }
 
 /// Energy that bodies gained while nothing drove them, J.
@@ -85,8 +96,12 @@ struct Energy {
     gain: f64,
     /// When the gain was greatest, s.
     time: f64,
+    /// When the gain was first one that is told, s.
+    first: Option<f64>,
     /// The greatest kinetic energy.
     kinetic: f64,
+    /// A gain up to this is not visible.
+    visible: f64,
 }
 
 /// Kinetic and potential energy, J.
@@ -96,11 +111,21 @@ pub(crate) fn energies(system: &System) -> [f64; 2] {
 
 impl Watch {
     pub(crate) fn new(scene: &SceneFile, system: &System) -> Self {
+        let sizes: Vec<f64> =
+            system.bodies().iter().map(|body| system.diagonal(body).unwrap_or(0.0)).collect();
+        let masses = system.bodies().iter().zip(&sizes).filter_map(|(body, size)| match body.mass {
+            Mass::Free(mass) => Some((mass.mass, *size)),
+            Mass::Fixed | Mass::Kinematic => None,
+        });
+        let (mass, size) =
+            masses.fold((0.0, f64::INFINITY), |(m, least), (mass, size)| (m + mass, size.min(least)));
+        let visible = 0.5 * mass * (VISIBLE * size / scene.time_step).powi(2);
         Self {
             deep: (scene.detector.mode != DetectorMode::Off).then_some(scene.solver.deep),
             joints: vec![Apart::default(); system.joints().len()],
-            energy: Energy::default(),
-            sizes: system.bodies().iter().map(|body| system.diagonal(body).unwrap_or(0.0)).collect(),
+            energy: Energy { visible, ..Energy::default() },
+            sizes,
+            time_step: scene.time_step,
         }
     }
 
@@ -109,10 +134,8 @@ impl Watch {
     pub(crate) fn observe(&mut self, system: &System, before: [f64; 2], time: f64) {
         for (apart, joint) in self.joints.iter_mut().zip(system.joints()) {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
-            if distance > apart.distance {
-                (apart.distance, apart.time) = (distance, time);
-            }
-            apart.angle = apart.angle.max(angle);
+            let size = self.sizes.get(joint.child).copied().unwrap_or(0.0);
+            apart.observe(distance, angle, size, time);
         }
         self.energy.observe(system, before, time);
     }
@@ -126,24 +149,16 @@ impl Watch {
         })
     }
 
-    /// The warnings of a run with these steps of `time_step` seconds, and `system` at its end.
-    pub(crate) fn warnings(
-        &self,
-        system: &System,
-        totals: &Totals,
-        hidden: &[HiddenPair],
-        time_step: f64,
-    ) -> Vec<Warning> {
-        let mut warnings: Vec<Warning> = hidden.iter().map(of_hidden).collect();
-        warnings.extend(self.overlap(system));
-        warnings.extend(self.joint(system));
-        warnings.extend(self.energy(system, time_step));
-        warnings.extend(not_converged(totals, time_step));
-        warnings
+    /// What the steps so far did not do as the scene asks, but overlaps. `system` is that after the
+    /// last step.
+    pub(crate) fn so_far(&self, system: &System, totals: &Totals) -> Vec<Warning> {
+        let warnings = [self.joint(system), self.energy(), not_converged(totals, self.time_step)];
+        warnings.into_iter().flatten().collect()
     }
 
-    /// Of bodies that overlap. Of pairs that cannot be measured nothing is said.
-    fn overlap(&self, system: &System) -> Option<Warning> {
+    /// Of bodies that overlap in this state at the end, at `time`, s. Of pairs that cannot be
+    /// measured nothing is said.
+    pub(crate) fn overlap(&self, system: &System, time: f64) -> Option<Warning> {
         let deep = self.overlaps(system, self.deep?).unwrap_or_default();
         let worst = deep.iter().max_by(|x, y| x.1.total_cmp(&y.1))?;
         let names = worst.0.map(|body| system.bodies()[body].name.clone());
@@ -153,11 +168,13 @@ impl Watch {
             worst.1,
             among(deep.len(), "pairs that overlap deeply")
         );
+        let count = deep.len() as u64;
         Some(Warning {
             kind: WarningKind::Overlap,
             names: names.into(),
+            time,
             value: worst.1,
-            count: deep.len() as u64,
+            count,
             message,
         })
     }
@@ -178,52 +195,43 @@ impl Watch {
             if bound <= 0.0 || !(is_free(a) || is_free(b)) {
                 continue;
             }
-            let options = ClearanceOptions { tolerance: Length::Absolute(TOLERANCE * bound) };
-            let depth = -clearance(scene, first, second, &options)?.distance;
-            if depth > bound {
-                found.push(([a, b], depth));
+            let options = PenetrationOptions { above: bound, tolerance: TOLERANCE * bound };
+            let measured = deepest_penetration(scene, &[[first, second]], &options)?;
+            if let Some((_, clearance)) = measured.deepest {
+                found.push(([a, b], -clearance.distance));
             }
         }
         Ok(found)
     }
 
     fn joint(&self, system: &System) -> Option<Warning> {
-        let share = |(apart, joint): (&Apart, &Joint)| {
-            let size = self.sizes.get(joint.child).copied().unwrap_or(0.0);
-            (apart.distance / (APART * size)).max(apart.angle / TWISTED)
-        };
-        let shares: Vec<f64> = self.joints.iter().zip(system.joints()).map(share).collect();
-        let count = shares.iter().filter(|share| **share > 1.0).count() as u64;
-        let worst = (0..shares.len()).max_by(|&x, &y| shares[x].total_cmp(&shares[y]))?;
-        let (joint, apart) = (&system.joints()[worst], self.joints[worst]);
-        let Apart { distance, angle, time } = apart;
+        let first = self.joints.iter().filter_map(|apart| apart.first).reduce(f64::min)?;
+        let count = self.joints.iter().filter(|apart| apart.first.is_some()).count();
+        let of_all = self.joints.iter().zip(system.joints());
+        let (apart, joint) = of_all.max_by(|x, y| x.0.share.total_cmp(&y.0.share))?;
+        let Apart { distance, angle, time, .. } = apart;
         let message = format!(
             "joint {} came apart by {distance:.3e} m and {angle:.3e} rad, farthest at {time:.4} s{}: shorten the time \
              step, or see whether joints, limits and contacts contradict each other",
             joint.name,
-            among(count as usize, "joints that came apart")
+            among(count, "joints that came apart")
         );
-        (count > 0).then(|| Warning {
+        Some(Warning {
             kind: WarningKind::Joint,
             names: vec![joint.name.clone()],
-            value: distance,
-            count,
+            time: first,
+            value: *distance,
+            count: count as u64,
             message,
         })
     }
 
-    fn energy(&self, system: &System, time_step: f64) -> Option<Warning> {
-        let Energy { gain, time, kinetic, .. } = self.energy;
-        let masses = system.bodies().iter().zip(&self.sizes).filter_map(|(body, size)| match body.mass {
-            Mass::Free(mass) => Some((mass.mass, *size)),
-            Mass::Fixed | Mass::Kinematic => None,
-        });
-        let (mass, size) =
-            masses.fold((0.0, f64::INFINITY), |(m, least), (mass, size)| (m + mass, size.min(least)));
-        let visible = 0.5 * mass * (VISIBLE * size / time_step).powi(2);
-        (gain > visible && gain > GAIN * kinetic).then(|| Warning {
+    fn energy(&self) -> Option<Warning> {
+        let Energy { gain, time, first, kinetic, .. } = self.energy;
+        self.energy.is_told().then(|| Warning {
             kind: WarningKind::Energy,
             names: Vec::new(),
+            time: first.unwrap_or(time),
             value: gain,
             count: 1,
             message: format!(
@@ -232,6 +240,20 @@ impl Watch {
                 1e2 * gain / kinetic
             ),
         })
+    }
+}
+
+impl Apart {
+    /// A distance, m, and an angle, rad, of a joint whose child has this size, m.
+    fn observe(&mut self, distance: f64, angle: f64, size: f64, time: f64) {
+        if distance > self.distance {
+            (self.distance, self.time) = (distance, time);
+        }
+        self.angle = self.angle.max(angle);
+        self.share = (self.distance / (APART * size)).max(self.angle / TWISTED);
+        if self.share > 1.0 {
+            self.first.get_or_insert(time);
+        }
     }
 }
 
@@ -250,6 +272,13 @@ impl Energy {
         if self.change - self.least > self.gain {
             (self.gain, self.time) = (self.change - self.least, time);
         }
+        if self.is_told() {
+            self.first.get_or_insert(time);
+        }
+    }
+
+    fn is_told(&self) -> bool {
+        self.gain > self.visible && self.gain > GAIN * self.kinetic
     }
 }
 
@@ -260,10 +289,12 @@ fn is_driven(system: &System) -> bool {
         || system.wrenches().iter().any(|wrench| wrench.force.length() > 0.0 || wrench.torque.length() > 0.0)
 }
 
-fn of_hidden(pair: &HiddenPair) -> Warning {
+/// Of a pair whose first hidden overlap was at `time`, s.
+pub(crate) fn of_hidden(pair: &HiddenPair, time: f64) -> Warning {
     Warning {
         kind: WarningKind::Hidden,
         names: pair.bodies.to_vec(),
+        time,
         value: pair.depth,
         count: pair.steps,
         message: pair.message(),
@@ -279,7 +310,8 @@ fn not_converged(totals: &Totals, time_step: f64) -> Option<Warning> {
         1e6 * way
     );
     let value = unconverged as f64 / steps as f64;
-    Some(Warning { kind: WarningKind::NotConverged, names: Vec::new(), value, count: unconverged, message })
+    let (kind, names) = (WarningKind::NotConverged, Vec::new());
+    Some(Warning { kind, names, time: first, value, count: unconverged, message })
 }
 
 fn among(count: usize, what: &str) -> String {

@@ -6,7 +6,10 @@ use tesdf_sim::record::RecordError;
 
 use crate::report::{self, Failure};
 
-/// Opens a run, and prints a note if it is not complete.
+/// Most warnings of a run that are printed when it is opened.
+const MOST: usize = 8;
+
+/// Opens a run, and prints a note if it is not complete, and its warnings.
 ///
 /// # Errors
 /// The same errors as [`RunRecord::open`]. The message names the file.
@@ -17,6 +20,14 @@ pub fn open(path: &Path) -> Result<RunRecord, Failure> {
         report::note(&format!(
             "{name} has {made} of {planned} steps: it is still running, or it was interrupted; `tesdf simulate --resume {name}` continues it"
         ));
+    }
+    let (name, warnings) = (path.display(), record.warnings());
+    for warning in warnings.iter().take(MOST) {
+        report::warning(&format!("{name}: {}", warning.message));
+    }
+    if warnings.len() > MOST {
+        let more = report::count(warnings.len() - MOST, "more warning");
+        report::note(&format!("{name} has {more}; `tesdf view {name}` shows all of them"));
     }
     Ok(record)
 }

@@ -144,6 +144,16 @@ fn a_hidden_overlap_is_reported_and_meets_no_criterion() {
     // The record has it as well.
     let record = RunRecord::open(folder.path("run")).unwrap();
     assert_eq!(serde_json::to_value(record.hidden_pairs()).unwrap(), json["hidden"]);
+    let warnings = serde_json::to_value(record.warnings()).unwrap();
+    assert_eq!(warnings, json["warnings"]);
+    assert!(warnings.as_array().unwrap().iter().any(|warning| warning["kind"] == "hidden"), "{warnings}");
+    let (code, _, err) = folder.tesdf(&["view", "run", "--contacts", "0", "-o", "page.html"]);
+    let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
+    for warning in warnings.as_array().unwrap() {
+        let (line, text) = (warning["message"].as_str().unwrap(), warning["message"].to_string());
+        assert!(code == Some(0) && err.contains(&format!("warning: run: {line}\n")), "{err}");
+        assert!(page.contains(&text), "{text}");
+    }
 
     folder.write("judged.toml", TWINS.to_string() + &SCREW.replace("ball", "above"));
     let (code, out, err) = folder.tesdf(&["simulate", "judged.toml", "-o", "run"]);

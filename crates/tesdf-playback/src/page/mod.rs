@@ -63,7 +63,9 @@ pub fn page(
     }
     let contacts = contacts.map(|frames| push_contacts(&mut numbers, frames));
     let around = |p: DVec3| (p - run.centre).to_array();
+    let warnings: Vec<String> = run.record.warnings().into_iter().map(|warning| warning.message).collect();
     let about = json!({
+        "warnings": warnings,
         "times": run.times, "steps": run.steps, "meshes": meshes, "bodies": bodies, "contacts": contacts,
         "bounds": [around(run.bounds.min), around(run.bounds.max)], "middle": around(run.bounds.center()),
         "diagonal": run.diagonal(), "square": square,

@@ -128,7 +128,10 @@ class Player {
   }
 
   fillLists() {
-    const { bodies, contacts, times } = this.run;
+    const { bodies, contacts, times, warnings } = this.run;
+    element("about-warnings").hidden = warnings.length === 0;
+    element("about-warnings").firstElementChild.textContent = `Warnings (${warnings.length})`;
+    element("warnings").append(...warnings.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
     const lists = bodies.map((body, number) => {
       const [item, label, box, colour] = ["li", "label", "input", "i"].map((name) => document.createElement(name));
       Object.assign(box, { type: "checkbox", checked: true });

@@ -1,6 +1,9 @@
 //! What several criteria look up and measure.
 use tesdf::Length;
-use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, clearance, instance_pairs};
+use tesdf::collide::{
+    ClearanceOptions, CollideError, InstanceId, PenetrationOptions, clearance, deepest_penetration,
+    instance_pairs,
+};
 use tesdf::glam::DVec3;
 
 use crate::joint::wrapped;
@@ -75,23 +78,36 @@ pub(super) struct Penetration {
 }
 
 impl Penetration {
-    /// Measures the clearance of pairs of instances at the current states, to `tolerance` metres.
+    /// Measures the penetration of pairs of instances at the current states, to `tolerance` metres.
+    /// What cannot be deeper than all before is not searched.
     pub(super) fn measure(&mut self, system: &System, pairs: &[[InstanceId; 2]], tolerance: f64) {
-        match least_distance(system, pairs, tolerance) {
-            Ok(distance) => {
-                self.measurements += 1;
-                self.depth = self.depth.max(-distance);
-            }
-            Err(reason) => self.unmeasured.push(reason),
-        }
+        let measured = at_states(system, |system| self.deepen(system, pairs, tolerance));
+        self.unmeasured.extend(measured.err());
     }
 
-    /// Measures the clearance of all pairs whose bounds overlap at the current states, to
-    /// `tolerance` metres.
+    /// As [`measure`](Self::measure), of all pairs whose bounds overlap at the current states.
     pub(super) fn measure_all(&mut self, system: &System, tolerance: f64) {
-        match near(system, 0.0) {
-            Ok(pairs) => self.measure(system, &pairs, tolerance),
-            Err(reason) => self.unmeasured.push(reason),
+        let measured = at_states(system, |system| {
+            let pairs = instance_pairs(system.scene(), 0.0, 0.0).map_err(|e| e.to_string())?;
+            let pairs: Vec<_> = pairs.iter().map(|pair| [pair.first, pair.second]).collect();
+            self.deepen(system, &pairs, tolerance)
+        });
+        self.unmeasured.extend(measured.err());
+    }
+
+    fn deepen(&mut self, system: &System, pairs: &[[InstanceId; 2]], tolerance: f64) -> Result<(), String> {
+        let options = PenetrationOptions { above: self.depth, tolerance };
+        let found = deepest_penetration(system.scene(), pairs, &options).map_err(|e| e.to_string())?;
+        self.measurements += 1;
+        if let Some((_, clearance)) = found.deepest {
+            self.depth = self.depth.max(-clearance.distance);
+        }
+        match found.converged {
+            true => Ok(()),
+            false => Err(format!(
+                "the search was cut short: two bodies may be {:.3e} m deep in each other",
+                found.upper_bound
+            )),
         }
     }
 
@@ -121,24 +137,28 @@ pub(super) fn least_distance(
     tolerance: f64,
 ) -> Result<f64, String> {
     let options = ClearanceOptions { tolerance: Length::Absolute(tolerance) };
-    let measured = || -> Result<f64, CollideError> {
-        // The instances of the system have the poses of the last detection.
-        let mut system = system.clone();
-        let states = system.states().to_vec();
-        let scene = system.scene_at(&states)?;
-        let distance = |&[a, b]: &[InstanceId; 2]| Ok(clearance(scene, a, b, &options)?.distance);
-        pairs.iter().map(distance).try_fold(f64::INFINITY, |least, d| Ok(least.min(d?)))
-    };
-    measured().map_err(|e| e.to_string())
+    at_states(system, |system| {
+        let distance = |&[a, b]: &[InstanceId; 2]| Ok(clearance(system.scene(), a, b, &options)?.distance);
+        let least = pairs.iter().map(distance).try_fold(f64::INFINITY, |least, d| Ok(least.min(d?)));
+        least.map_err(|e: CollideError| e.to_string())
+    })
 }
 
 /// The pairs of instances whose bounds come within `distance` metres at the current states.
 pub(super) fn near(system: &System, distance: f64) -> Result<Vec<[InstanceId; 2]>, String> {
+    at_states(system, |system| {
+        let pairs = instance_pairs(system.scene(), distance, 0.0).map_err(|e| e.to_string())?;
+        Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
+    })
+}
+
+/// Measures a system whose instances have the poses of its states: otherwise they have those of the
+/// last detection.
+fn at_states<T>(system: &System, measure: impl FnOnce(&System) -> Result<T, String>) -> Result<T, String> {
     let mut system = system.clone();
     let states = system.states().to_vec();
-    let scene = system.scene_at(&states).map_err(|e| e.to_string())?;
-    let pairs = instance_pairs(scene, distance, 0.0).map_err(|e| e.to_string())?;
-    Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
+    system.scene_at(&states).map_err(|e| e.to_string())?;
+    measure(&system)
 }
 
 /// A hinge whose turns are counted.

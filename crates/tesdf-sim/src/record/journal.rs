@@ -15,7 +15,8 @@
 //! Frame k + 1 is the state after k steps: a [`StateHead`], then poses and velocities. The contacts
 //! at the beginning of the last step follow if they are recorded: points, normals, distances and
 //! ids, in the types of the complete file. The ids and depths of the hidden overlaps at that time
-//! come last.
+//! follow. Where the `warnings` of the metadata are others than those of the frame before, they come
+//! last, as JSON; each replaces all before.
 //!
 //! Each frame is written by one call, which does not wait for the disk. A process that is killed
 //! therefore loses at most its current step. A power failure also loses the data that the operating
@@ -27,13 +28,11 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use tesdf::save::{Destination, GrowingFile, SaveError};
 
-use super::{About, RecordError, RunRecord};
+use super::{About, RUN_VERSION, RecordError, RunRecord, told};
 use crate::simulate::{PartialRun, Totals};
-use crate::{Residual, RunOrigin, StepReport};
+use crate::{Residual, RunOrigin, StepReport, Warning};
 
 const MAGIC: &[u8; 8] = b"tesdfrun";
-/// The journal version that this build writes and reads.
-const JOURNAL_VERSION: u32 = 2;
 const HEAD: usize = MAGIC.len() + size_of::<u32>();
 const CHECKSUM: usize = 16;
 /// In place of a number of contacts: the contacts are not recorded.
@@ -57,6 +56,8 @@ pub struct RunJournal {
     path: PathBuf,
     frames: u64,
     bytes: u64,
+    /// The warnings of the last frame.
+    told: Vec<Warning>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -84,13 +85,15 @@ struct StateHead {
     kept: u64,
     /// Number of hidden overlaps in this frame.
     hidden: u64,
+    /// Bytes of the warnings in this frame; 0 where they are those of the frame before.
+    warnings: u64,
     iterations: u32,
     converged: u32,
     /// [`Residual`]: m, N.
     residual: [f64; 2],
 }
 
-const _: () = assert!(size_of::<StateHead>() == 80);
+const _: () = assert!(size_of::<StateHead>() == 88);
 
 /// Whether `bytes` begin like a journal.
 pub(super) fn is_journal(bytes: &[u8]) -> bool {
@@ -108,12 +111,14 @@ impl RunJournal {
         record: &RunRecord,
         origin: &RunOrigin,
     ) -> Result<Option<Self>, RecordError> {
-        let first = First { about: record.about(), origin: origin.clone() };
+        // There is no warning before the first step.
+        let about = About { warnings: Vec::new(), ..record.about() };
+        let first = First { about, origin: origin.clone() };
         let first = serde_json::to_vec(&first).map_err(|e| RecordError::NotARun(e.to_string()))?;
-        let mut bytes = [&MAGIC[..], &JOURNAL_VERSION.to_le_bytes()].concat();
+        let mut bytes = [&MAGIC[..], &RUN_VERSION.to_le_bytes()].concat();
         bytes.extend(frame(0, &first));
-        bytes.extend(frame(1, &state(record, 0, &StepReport::default())));
-        Self::write(destination, &bytes, 2)
+        bytes.extend(frame(1, &state(record, 0, &StepReport::default(), &[])));
+        Self::write(destination, &bytes, 2, &[])
     }
 
     /// Replaces the destination by the complete frames of an interrupted run; [`push`](Self::push)
@@ -122,14 +127,21 @@ impl RunJournal {
     /// # Errors
     /// The same errors as [`begin`](Self::begin).
     pub fn resume(destination: &Destination, earlier: &InterruptedRun) -> Result<Option<Self>, RecordError> {
-        Self::write(destination, &earlier.bytes, 2 + earlier.run.record.steps())
+        let RunRecord { told, .. } = &earlier.run.record;
+        Self::write(destination, &earlier.bytes, 2 + earlier.run.record.steps(), told)
     }
 
-    fn write(destination: &Destination, bytes: &[u8], frames: u64) -> Result<Option<Self>, RecordError> {
+    fn write(
+        destination: &Destination,
+        bytes: &[u8],
+        frames: u64,
+        told: &[Warning],
+    ) -> Result<Option<Self>, RecordError> {
         let Some(mut part) = destination.part()? else { return Ok(None) };
         let path = destination.path().to_path_buf();
         part.write_all(bytes).map_err(|source| failed(&path, source))?;
-        Ok(Some(Self { file: part.finish()?, path, frames, bytes: bytes.len() as u64 }))
+        let (file, bytes, told) = (part.finish()?, bytes.len() as u64, told.to_vec());
+        Ok(Some(Self { file, path, frames, bytes, told }))
     }
 
     /// Appends the last state of `record` and the report of the step that led to it.
@@ -137,7 +149,11 @@ impl RunJournal {
     /// # Errors
     /// [`RecordError::Save`]; the file then ends with the step before.
     pub fn push(&mut self, record: &RunRecord, report: &StepReport) -> Result<(), RecordError> {
-        let frame = frame(self.frames, &state(record, record.steps() as usize, report));
+        let told = match record.told == self.told {
+            true => Vec::new(),
+            false => serde_json::to_vec(&record.told).map_err(|e| RecordError::NotARun(e.to_string()))?,
+        };
+        let frame = frame(self.frames, &state(record, record.steps() as usize, report, &told));
         self.file.write_all(&frame).map_err(|source| {
             // Readers skip an incomplete frame, but a full disk may need its space.
             let _ = self.file.cut(self.bytes);
@@ -145,6 +161,7 @@ impl RunJournal {
         })?;
         self.frames += 1;
         self.bytes += frame.len() as u64;
+        self.told.clone_from(&record.told);
         Ok(())
     }
 }
@@ -175,19 +192,26 @@ impl InterruptedRun {
     pub(super) fn from_bytes(mut bytes: Vec<u8>) -> Result<Self, RecordError> {
         let version = bytes.get(MAGIC.len()..HEAD).and_then(|version| version.try_into().ok());
         match version.map(u32::from_le_bytes) {
-            Some(JOURNAL_VERSION) => {}
-            Some(found) => return Err(RecordError::Version { found, reads: JOURNAL_VERSION }),
+            Some(RUN_VERSION) => {}
+            Some(found) => return Err(RecordError::Version { found, reads: RUN_VERSION }),
             None => return Err(RecordError::NotARun(NO_STATE.into())),
         }
         let mut frames = Frames { bytes: &bytes, at: HEAD, number: 0 };
         let first = frames.next().ok_or_else(|| RecordError::NotARun(NO_STATE.into()))?;
         let First { about, origin } = serde_json::from_slice(first)
             .map_err(|e| RecordError::NotARun(format!("its first frame: {e}")))?;
-        let mut run = PartialRun { record: RunRecord::of_about(about), totals: Totals::default() };
+        let mut run = PartialRun { record: RunRecord::of_about(about)?, totals: Totals::default() };
         while let Some(payload) = frames.next() {
-            read_state(payload, &mut run).ok_or_else(|| {
-                RecordError::NotARun(format!("frame {} does not fit its bodies", frames.number - 1))
-            })?;
+            let refused =
+                |reason: String| RecordError::NotARun(format!("frame {} {reason}", frames.number - 1));
+            let told =
+                read_state(payload, &mut run).ok_or_else(|| refused("does not fit its bodies".into()))?;
+            if !told.is_empty() {
+                let told: Vec<Warning> =
+                    serde_json::from_slice(told).map_err(|e| refused(format!("has warnings: {e}")))?;
+                told::check(&told, &run.record.bodies).map_err(|e| refused(format!("has warnings: {e}")))?;
+                run.record.told = told;
+            }
         }
         if run.record.times.is_empty() {
             return Err(RecordError::NotARun(NO_STATE.into()));
@@ -236,8 +260,8 @@ fn checksum(number: u64, payload: &[u8]) -> [u8; CHECKSUM] {
     checksum
 }
 
-/// The payload of the state after `step` steps.
-fn state(record: &RunRecord, step: usize, report: &StepReport) -> Vec<u8> {
+/// The payload of the state after `step` steps, with the bytes of new warnings.
+fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8]) -> Vec<u8> {
     let before = step.checked_sub(1).map(|before| before as u64);
     let kept = before.and_then(|before| record.contact_range(before));
     let hidden = before.map_or(0..0, |before| record.hidden.of_step(before));
@@ -249,6 +273,7 @@ fn state(record: &RunRecord, step: usize, report: &StepReport) -> Vec<u8> {
         solution: nanoseconds(report.solution),
         kept: kept.as_ref().map_or(NOT_KEPT, |range| range.len() as u64),
         hidden: hidden.len() as u64,
+        warnings: told.len() as u64,
         iterations: report.iterations,
         converged: report.converged.into(),
         residual: [report.residual.way, report.residual.force],
@@ -265,6 +290,7 @@ fn state(record: &RunRecord, step: usize, report: &StepReport) -> Vec<u8> {
         bytemuck::cast_slice(&record.ids[kept]),
         bytemuck::cast_slice(&record.hidden.ids[hidden.clone()]),
         bytemuck::cast_slice(&record.hidden.depths[hidden]),
+        told,
     ]
     .concat()
 }
@@ -273,8 +299,9 @@ fn nanoseconds(duration: std::time::Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Appends a state to a run. Returns `None` when the length of the payload does not match its head.
-fn read_state(mut payload: &[u8], run: &mut PartialRun) -> Option<()> {
+/// Appends a state to a run, and returns the bytes of its warnings. Returns `None` when the length
+/// of the payload does not match its head.
+fn read_state<'a>(mut payload: &'a [u8], run: &mut PartialRun) -> Option<&'a [u8]> {
     let record = &mut run.record;
     let (steps, bodies) = (record.times.len() as u64, record.bodies.len());
     let head: StateHead = take(&mut payload, 1)?.pop()?;
@@ -308,7 +335,7 @@ fn read_state(mut payload: &[u8], run: &mut PartialRun) -> Option<()> {
             ..StepReport::default()
         });
     }
-    payload.is_empty().then_some(())
+    (payload.len() as u64 == head.warnings).then_some(payload)
 }
 
 /// Removes `count` values from the front of the payload. They are copied because the numbers of a

@@ -159,7 +159,7 @@ fn a_run_made_step_by_step_is_the_same() {
     }
     assert_eq!(run.planned_steps(), STEPS);
     assert_eq!(timeless(&run.summary(engine.system())), timeless(&summary));
-    assert_eq!(run.clone().into_record(), whole);
+    assert_eq!(run.clone().into_record(engine.system()), whole);
     // The duration does not limit the steps.
     assert_eq!(run.step(&mut engine).unwrap().step, STEPS + 1);
 }
@@ -253,8 +253,8 @@ fn complete_runs_and_other_files_are_not_resumed() {
     bench.whole().0.save(&path).unwrap();
     assert!(matches!(open(), RecordError::Complete { steps: STEPS }));
     fs::write(&path, b"tesdfrun\x09\0\0\0").unwrap();
-    assert!(matches!(open(), RecordError::Version { found: 9, reads: 2 }));
-    for bytes in [&b"tesdfrun"[..], b"tesdfrun\x02\0\0\0", b"solid cube"] {
+    assert!(matches!(open(), RecordError::Version { found: 9, reads: 3 }));
+    for bytes in [&b"tesdfrun"[..], b"tesdfrun\x03\0\0\0", b"solid cube"] {
         fs::write(&path, bytes).unwrap();
         let text = open().to_string();
         assert!(text.starts_with("not a run of tesdf: ") && text.contains("simulate"), "{text}");

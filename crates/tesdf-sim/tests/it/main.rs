@@ -13,6 +13,7 @@ mod lift;
 mod mass_by_rule;
 mod newton;
 mod passing;
+mod recorded_warnings;
 mod rest;
 mod scene_file;
 mod screw;

@@ -124,7 +124,7 @@ pub struct Pair<'a> {
 
 /// The body whose surface is searched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Surface {
+pub(super) enum Surface {
     A,
     B,
 }
@@ -193,6 +193,14 @@ impl<'a> Pair<'a> {
             _ => self.shares_volume(tolerance),
         };
         Ok(Clearance { overlap, ..found })
+    }
+
+    /// The surfaces that can be inside the other body, each in its field.
+    pub(super) fn surfaces(&self) -> Vec<(Surface, Order<'_>)> {
+        let is_plane = [&self.a, &self.b].iter().any(|body| matches!(body.shape, Shape::Plane));
+        let first = self.first();
+        let of = if is_plane { vec![first] } else { vec![first, first.other()] };
+        of.into_iter().map(|of| (of, self.order(of, self.field(of)))).collect()
     }
 
     /// Whether bodies whose surfaces touch up to the tolerance share volume. It tests whether a
@@ -267,32 +275,40 @@ impl<'a> Pair<'a> {
         searches: Vec<(Surface, FieldBody<'_>)>,
         tolerance: f64,
     ) -> Result<Clearance, CollideError> {
-        let (surfaces, orders): (Vec<Surface>, Vec<Order>) = searches
-            .into_iter()
-            .map(|(of, field)| {
-                let Body { shape, placement, .. } = self.body(of);
-                (of, Order { surface: SurfaceBody::new(shape, *placement, &field), field })
-            })
-            .unzip();
-        let Some(Least { order, distance, lower_bound, lowest, converged }) = least(&orders, tolerance)
-        else {
-            return Err(CollideError::NoClearance {
-                a: self.a.id,
-                b: self.b.id,
-                reason: "their positions are too far out for double precision; expected the bodies nearer to the origin",
-            });
-        };
-        let Order { surface, field } = &orders[order];
+        let (surfaces, orders): (Vec<Surface>, Vec<Order>) =
+            searches.into_iter().map(|(of, field)| (of, self.order(of, field))).unzip();
+        let found = least(&orders, tolerance).ok_or_else(|| self.too_far())?;
+        Ok(self.witnesses(surfaces[found.order], &orders[found.order], &found, tolerance))
+    }
+
+    /// The surface of a body in the field of the other one.
+    fn order<'b>(&'b self, of: Surface, field: FieldBody<'b>) -> Order<'b> {
+        let Body { shape, placement, .. } = self.body(of);
+        Order { surface: SurfaceBody::new(shape, *placement, &field), field }
+    }
+
+    pub(super) fn too_far(&self) -> CollideError {
+        CollideError::NoClearance {
+            a: self.a.id,
+            b: self.b.id,
+            reason: "their positions are too far out for double precision; expected the bodies nearer to the origin",
+        }
+    }
+
+    /// What was found of a surface in a field.
+    pub(super) fn witnesses(&self, of: Surface, order: &Order, found: &Least, tolerance: f64) -> Clearance {
+        let Least { distance, lower_bound, lowest, converged, .. } = *found;
+        let Order { surface, field } = order;
         let gradient = lowest.value.gradient;
         let points = field.surface_points(lowest.point, lowest.radius, &lowest.value);
         let [on_surface, on_field] = points.map(|p| field.to_world(p));
         let away = field.rotate(gradient);
         let (face_surface, (face_field, _)) = (surface.face_id(lowest.face), field.names(&lowest.value));
-        let (point_a, point_b, normal, face_a, face_b, field) = match surfaces[order] {
+        let (point_a, point_b, normal, face_a, face_b, field) = match of {
             Surface::A => (on_surface, on_field, away, face_surface, face_field, self.b.id),
             Surface::B => (on_field, on_surface, -away, face_field, face_surface, self.a.id),
         };
-        Ok(Clearance {
+        Clearance {
             distance,
             lower_bound,
             point_a,
@@ -303,7 +319,7 @@ impl<'a> Pair<'a> {
             field,
             converged,
             overlap: distance < -tolerance,
-        })
+        }
     }
 
     fn body(&self, of: Surface) -> &Body<'a> {

@@ -15,6 +15,14 @@ pub struct Order<'a> {
     pub field: FieldBody<'a>,
 }
 
+impl Order<'_> {
+    /// Whether positions are near enough for double precision.
+    pub fn has_distances(&self) -> bool {
+        let (center, _) = self.surface.face(0, &self.field, 0.0).ball();
+        self.field.rough(center).0.is_finite()
+    }
+}
+
 /// The lowest point of several surfaces, each in its field. Lengths are in the world's unit, except
 /// for those of `lowest`.
 #[derive(Clone, Copy, Debug)]
@@ -66,12 +74,33 @@ const SHARE: usize = 8;
 /// long as no overlap is known, only the first order is searched. Then the other orders are
 /// searched for points that are at least as deep as the distance.
 pub fn least(orders: &[Order], tolerance: f64) -> Option<Least> {
-    Search::new(orders, tolerance).run(MAX_PARTS)
+    Search::new(orders, tolerance, f64::INFINITY).run(MAX_PARTS).least
+}
+
+/// As [`least`], of any number of pairs, of points below a signed distance of at most 0: nothing is
+/// found where none is lower than `below` by more than the tolerance. Distances outside are then
+/// never wanted, which take most of the time where bodies touch.
+pub fn least_below(orders: &[Order], tolerance: f64, below: f64) -> Below {
+    let parts = MAX_PARTS.saturating_mul(orders.len().max(1) as u64);
+    Search::new(orders, tolerance, below.min(0.0)).run(parts)
+}
+
+/// What a search below a signed distance found.
+#[derive(Clone, Copy, Debug)]
+pub struct Below {
+    /// The lowest point, if one is below.
+    pub least: Option<Least>,
+    /// No point is lower than this.
+    pub lower_bound: f64,
+    /// Whether the error is within the tolerance.
+    pub converged: bool,
 }
 
 struct Search<'a> {
     orders: &'a [Order<'a>],
     tolerance: f64,
+    /// Only signed distances below this are wanted.
+    below: f64,
     /// The lowest signed distance, in the world's unit, its order and its point.
     best: Option<(f64, usize, Lowest)>,
     open: Queue<Open>,
@@ -80,17 +109,19 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(orders: &'a [Order<'a>], tolerance: f64) -> Self {
-        Self { orders, tolerance, best: None, open: Queue::new(), waiting: Vec::new() }
+    fn new(orders: &'a [Order<'a>], tolerance: f64, below: f64) -> Self {
+        Self { orders, tolerance, below, best: None, open: Queue::new(), waiting: Vec::new() }
     }
 
     /// Searches at most this number of parts.
-    fn run(mut self, max_parts: u64) -> Option<Least> {
+    fn run(mut self, max_parts: u64) -> Below {
         for order in 0..self.orders.len() {
             self.dive(order);
         }
         self.waiting = (1..self.orders.len()).collect();
-        self.push(f64::NEG_INFINITY, 0, Item::Tree(self.orders[0].surface.whole()));
+        if let Some(first) = self.orders.first() {
+            self.push(f64::NEG_INFINITY, 0, Item::Tree(first.surface.whole()));
+        }
         let mut parts = 0;
         let mut bound = f64::INFINITY;
         loop {
@@ -118,13 +149,20 @@ impl<'a> Search<'a> {
             };
             found.into_iter().for_each(|found| self.take(found));
         }
-        let (distance, order, lowest) = self.best?;
-        let within = distance - self.tolerance;
-        Some(Least { order, distance, lower_bound: bound.min(within), lowest, converged: bound >= within })
+        let within = self.least() - self.tolerance;
+        let (lower_bound, converged) = (bound.min(within), bound >= within);
+        let least = self.best.map(|(distance, order, lowest)| Least {
+            order,
+            distance,
+            lower_bound,
+            lowest,
+            converged,
+        });
+        Below { least, lower_bound, converged }
     }
 
     fn least(&self) -> f64 {
-        self.best.map_or(f64::INFINITY, |(distance, ..)| distance)
+        self.best.map_or(self.below, |(distance, ..)| distance)
     }
 
     /// Signed distances of an order above this are not wanted.
@@ -256,7 +294,7 @@ mod tests {
         assert!(exact.converged && exact.distance < 0.0, "{exact:?}");
         let mut early = 0;
         for parts in 1..40 {
-            let found = Search::new(&orders, 1e-9).run(parts).expect("a value");
+            let found = Search::new(&orders, 1e-9, f64::INFINITY).run(parts).least.expect("a value");
             assert!(found.lower_bound <= exact.distance, "{parts}: {found:?} {exact:?}");
             assert!(exact.lower_bound <= found.distance, "{parts}: {found:?} {exact:?}");
             early += u32::from(!found.converged);

@@ -19,6 +19,8 @@
 //!   them beside the contacts.
 //! - [`coarse_contacts`]: faces that touch between their vertices, where the mode node can miss it.
 //! - [`clearance`](clearance()): the signed distance between two instances, with witness points.
+//! - [`deepest_penetration`](deepest_penetration()): the deepest of many pairs, without the clearance
+//!   of each.
 //! - [`time_of_impact`](time_of_impact()): the time at which two moving instances first touch,
 //!   or that they stay apart; never too late.
 //! - [`why`](why()): why a contact is present or missing.
@@ -33,6 +35,7 @@ mod coarse;
 mod cones;
 mod contact;
 mod deepest;
+mod deepest_penetration;
 mod depth_bounds;
 mod descent;
 mod detect;
@@ -98,6 +101,7 @@ pub use candidates::{Candidate, candidates};
 pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use coarse::{CoarseContact, coarse_contacts};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
+pub use deepest_penetration::{DeepestPenetration, PenetrationOptions, deepest_penetration};
 pub use detect::{detect, detect_pairs, detect_until, detect_with};
 pub use error::CollideError;
 pub use hidden::hidden_overlaps;

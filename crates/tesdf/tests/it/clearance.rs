@@ -25,7 +25,7 @@ fn bumpy(seed: u64) -> Arc<TeSdf> {
     asset(&Surface::default().add_sphere(DVec3::ZERO, 2, || random.between(0.7, 1.0)).solid())
 }
 
-fn boxed(half: DVec3, n: u32) -> Arc<TeSdf> {
+pub fn boxed(half: DVec3, n: u32) -> Arc<TeSdf> {
     asset(&Surface::default().add_box(-half, half, n).solid())
 }
 
@@ -58,7 +58,7 @@ fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose::at(DVec3::new(x, y, z))
 }
 
-fn random_pose(random: &mut Random, distance: f64) -> Pose {
+pub fn random_pose(random: &mut Random, distance: f64) -> Pose {
     let rotation = DQuat::from_axis_angle(random.direction(), random.between(0.0, 6.0));
     Pose::new(distance * random.direction(), rotation).expect("a pose")
 }
@@ -176,7 +176,7 @@ fn deep(random: &mut Random, [a, b]: [&Arc<TeSdf>; 2]) -> [(Shape, Pose, f64); 2
     [body(a, 1.0, DVec3::ZERO), body(b, 0.9, DVec3::new(0.05, 0.1, -0.05))]
 }
 
-fn meshes() -> Vec<Arc<TeSdf>> {
+pub fn meshes() -> Vec<Arc<TeSdf>> {
     let mut meshes: Vec<Arc<TeSdf>> = [
         "procedural/tetra.obj",
         "procedural/beam.obj",

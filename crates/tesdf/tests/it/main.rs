@@ -15,6 +15,7 @@ mod contacts_none_lost;
 mod contacts_per_face;
 mod container;
 mod cosine_filter;
+mod deepest_penetration;
 mod deformation;
 mod degenerate_faces;
 mod documents;
