@@ -118,8 +118,12 @@ impl Dynamics for Wrong {
         self.engine.set_wrench(body, wrench)
     }
 
-    fn recall(&mut self, states: Vec<State>, time_step: Option<f64>) -> Result<bool, DynamicsError> {
+    fn recall(&mut self, states: Vec<State>, time_step: Option<f64>) -> Result<(), DynamicsError> {
         self.engine.recall(states, time_step)
+    }
+
+    fn remembers(&self) -> u64 {
+        self.engine.remembers()
     }
 
     fn step(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {

@@ -167,7 +167,9 @@ fn a_stack_that_is_hit_from_below_passes_the_push_on_at_once() {
 fn a_stack_that_is_hit_by_free_bodies_wakes() {
     let ball = "[[bodies]]\nname = \"ball\"\nmass = 2\nshape = { sphere = { radius = 0.04 } }\n\
                 translation = [-0.3, 0, 0.04]\n";
-    let scene = [PLATE, &stack(0.0, 3, 0.5), &stack(0.3, 2, 0.5), ball].concat();
+    // With friction a hit makes a tenth of a millimetre of the rounding by which flush faces have other
+    // contacts.
+    let scene = [PLATE, &stack(0.0, 3, 0.0), &stack(0.3, 2, 0.0), ball].concat();
     let mut two = Two::at_rest(&scene, 6);
     let fast = |engine: &mut Newton| {
         let state = engine.system().states()[6];

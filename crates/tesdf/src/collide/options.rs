@@ -17,7 +17,8 @@ pub enum Mode {
     Face,
     /// As [`Face`](Self::Face), but with the minimum itself, within a
     /// [`tolerance`](CollideOptions::tolerance). It comes from a closed form outside, and from
-    /// branch and bound inside.
+    /// branch and bound inside. Scene files may call it `edge`, the name of a mode that it contains.
+    #[serde(alias = "edge")]
     Exact,
 }
 
