@@ -25,6 +25,9 @@ const LIFT: f64 = 0.01;
 /// rounding of bodies at rest would add up.
 const STILL: f64 = 0.1;
 
+/// Room for the rows of joints behind those of contacts, which would have to move for more.
+const OTHERS: usize = 64;
+
 /// What the gaps of contacts depend on.
 #[derive(Clone, Copy)]
 pub struct Gaps<'a> {
@@ -118,7 +121,9 @@ impl<'a> Gaps<'a> {
             // Those of the detection are in the normal cones.
             Mode::Face | Mode::Exact => None,
         };
-        let (mut found, mut rows) = (Vec::with_capacity(contacts.len()), Vec::with_capacity(contacts.len()));
+        // Others follow the rows of contacts.
+        let mut rows = Vec::with_capacity(contacts.len() + OTHERS);
+        let mut found = Vec::with_capacity(contacts.len());
         let mut last: Option<(InstanceId, InstanceId, Pair)> = None;
         for (k, contact) in contacts.iter().enumerate() {
             let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);

@@ -86,10 +86,8 @@ impl<'a> Problem<'a> {
     /// the others that its solution closes, until there are none.
     pub fn minimise(&self, start: Vec<Vector6<f64>>, guess: Option<&[RowForce]>) -> Minimum {
         let Bodies { target, time_step, .. } = &self.bodies;
-        let gaps = |v: &[Vector6<f64>]| -> Vec<f64> {
-            self.rows.iter().map(|placed| placed.at(v, *time_step)).collect()
-        };
-        let (free, at_start) = (gaps(target), gaps(&start));
+        let gaps = |placed: &Placed<'_>| (placed.at(target, *time_step), placed.at(&start, *time_step));
+        let (free, at_start): (Vec<_>, Vec<_>) = self.rows.iter().map(gaps).unzip();
         let change = |k: usize| (at_start[k] - free[k]).abs();
         let of_all = NEAR_OF_ALL * (0..self.rows.len()).map(change).fold(0.0, f64::max);
         let is_near =

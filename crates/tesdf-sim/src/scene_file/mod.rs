@@ -286,7 +286,8 @@ pub enum DetectorMode {
     Node,
     /// The faces, by a fixed number of Frank–Wolfe iterations.
     Face,
-    /// The faces, with the exact minimum.
+    /// The faces, with the exact minimum. `edge`, the edges of faces, means the same.
+    #[serde(alias = "edge")]
     Exact,
     /// Nothing: bodies pass through each other. A criterion that holds even then tests nothing.
     Off,

@@ -17,8 +17,7 @@ pub enum Mode {
     Face,
     /// As [`Face`](Self::Face), but with the minimum itself, within a
     /// [`tolerance`](CollideOptions::tolerance). It comes from a closed form outside, and from
-    /// branch and bound inside. Scene files may call it `edge`, the name of a mode that it contains.
-    #[serde(alias = "edge")]
+    /// branch and bound inside.
     Exact,
 }
 
