@@ -12,6 +12,7 @@ use tesdf::collide::{
 use super::NewtonOptions;
 use super::chains::Iterate;
 use super::deep::{Surfaces, pair};
+use super::far::Reach;
 use super::gaps::Gaps;
 use super::geometric::{Loads, Motion, Start};
 use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
@@ -460,13 +461,18 @@ impl Newton {
         Ok(place.iter().any(Option::is_some))
     }
 
-    /// Bound of the way between the points of free bodies that these velocities move in a step, m.
-    fn farthest(&self, step: &Step, from: &[Vector6<f64>], to: &[Vector6<f64>]) -> f64 {
-        let way = |((free, from), to): ((&FreeBody, &Vector6<f64>), &Vector6<f64>)| {
+    /// For each free body a bound of the way between the points that these velocities move in a step,
+    /// m.
+    fn ways<'a>(
+        &'a self,
+        step: &'a Step,
+        from: &'a [Vector6<f64>],
+        to: &'a [Vector6<f64>],
+    ) -> impl Iterator<Item = f64> + 'a {
+        step.free.iter().zip(from).zip(to).map(|((free, from), to)| {
             let (linear, angular) = unpack(&(to - from));
             step.h * (linear.length() + self.sizes[free.body] * angular.length())
-        };
-        step.free.iter().zip(from).zip(to).map(way).fold(0.0, f64::max)
+        })
     }
 
     /// Whether a body has no directions.
@@ -591,47 +597,76 @@ impl Newton {
 
     /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
+        let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
+        let ways: Vec<f64> = self.ways(step, &start, &step.target).collect();
+        let mut reach = Reach::Near(&ways);
+        loop {
+            let (converged, residual) = (step.report.converged, step.report.residual);
+            if let Some(found) = self.velocities_within(step, contacts, &start, reach)? {
+                return Ok(found);
+            }
+            (step.report.converged, step.report.residual) = (converged, residual);
+            reach = Reach::All;
+        }
+    }
+
+    /// The same, with rows of the contacts within `near` and of those that a minimisation closes. Returns
+    /// `None` where the last of them are closed after all.
+    fn velocities_within(
+        &mut self,
+        step: &mut Step,
+        contacts: &[Contact],
+        start: &[Vector6<f64>],
+        near: Reach<'_>,
+    ) -> Result<Option<Velocities>, DynamicsError> {
         let all = contacts;
         let contacts = &*self.surfaces.acting(self.system.scene(), all, |c| self.is_deep(c));
-        let (found, mut first) = self.gaps(step).find(contacts, &step.poses);
-        self.gaps(step).begin(&found, &mut first);
         let joints = joint_rows(&self.gaps(step).bodies(), step.h);
-        first.extend_from_slice(&joints);
-        step.deep = self.deep(step, all, &first);
-        let deep = step.deep.clone();
-        // A deep body that is pushed into another one must not kick it, so what is detected again
-        // says nothing about deep bodies.
-        let stays = |row: &Row| row.sides.iter().flatten().any(|(k, _)| deep[*k]);
         // Where bodies overlap deeply, rigid contacts would contradict each other.
         let apart = self.apart(all);
-        for (row, found) in first.iter_mut().zip(&found).filter(|(row, _)| stays(row)) {
-            let parts = apart.contains(&pair(found.contact));
-            row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
-        }
-        // Those of the contacts, then those of the joints.
-        let first = first;
-        let of_contacts = &first[..found.len()];
-        // Those of the last detection.
-        let mut later: Option<Vec<Row>> = None;
-        let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut plain = Motion::new(&step.free, &step.target);
         let count = step.free.len();
         let loads =
             |rows: &[Row], forces: &[RowForce]| Loads::new(count, rows, forces, rows.len() - joints.len());
-        let from = Start { velocities: &start, h: step.h, whole: step.whole };
+        let from = Start { velocities: start, h: step.h, whole: step.whole };
         let mut found_at = vec![Vector6::zeros(); count];
-        let kept = self.kept.of(&first);
-        let of_kept =
-            kept.as_deref().and_then(|kept| plain.stiffened(&loads(&first, kept), &found_at, &from));
-        let motion = of_kept.as_ref().unwrap_or(&plain);
-        let guess = Guess { velocities: &start, forces: kept.as_deref() };
-        let (mut velocities, mut forces) = self.solve(step, motion, &first, Gap::Position, guess);
-        let mut stiffened = plain.stiffened(&loads(&first, &forces), &found_at, &from);
-        let again = stiffened.as_ref().unwrap_or(&plain);
-        if again.differs(motion, &plain) {
-            (velocities, forces) =
-                self.solve(step, again, &first, Gap::Position, from_last(&velocities, &forces));
-        }
+        let mut reach = near;
+        // Rows of the contacts, then those of the joints.
+        let (found, first, mut far, mut velocities, mut forces, mut stiffened) = loop {
+            let (found, mut first, far) = self.gaps(step).find(contacts, &step.poses, reach, step.h);
+            self.gaps(step).begin(&found, &mut first);
+            first.extend_from_slice(&joints);
+            step.deep = self.deep(step, all, &first);
+            for (row, found) in first.iter_mut().zip(&found).filter(|(row, _)| is_deep(row, &step.deep)) {
+                let parts = apart.contains(&pair(found.contact));
+                row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
+            }
+            let (converged, residual) = (step.report.converged, step.report.residual);
+            let kept = self.kept.of(&first);
+            let of_kept =
+                kept.as_deref().and_then(|kept| plain.stiffened(&loads(&first, kept), &found_at, &from));
+            let motion = of_kept.as_ref().unwrap_or(&plain);
+            let guess = Guess { velocities: start, forces: kept.as_deref() };
+            let (mut velocities, mut forces) = self.solve(step, motion, &first, Gap::Position, guess);
+            let stiffened = plain.stiffened(&loads(&first, &forces), &found_at, &from);
+            let again = stiffened.as_ref().unwrap_or(&plain);
+            if again.differs(motion, &plain) {
+                (velocities, forces) =
+                    self.solve(step, again, &first, Gap::Position, from_last(&velocities, &forces));
+            }
+            if !far.closes(&velocities, step.h) {
+                break (found, first, far, velocities, forces, stiffened);
+            }
+            (step.report.converged, step.report.residual) = (converged, residual);
+            reach = Reach::All;
+        };
+        let of_contacts = &first[..found.len()];
+        // Those of the last detection.
+        let mut later: Option<Vec<Row>> = None;
+        // A deep body that is pushed into another one must not kick it, so what is detected again
+        // says nothing about deep bodies.
+        let deep = step.deep.clone();
+        let stays = |row: &Row| is_deep(row, &deep);
         // The contacts at which bodies are hit, found where they are hit.
         let mut held: Vec<Row> = Vec::new();
         if first.iter().any(|row| !stays(row)) {
@@ -658,15 +693,20 @@ impl Newton {
                 // A step reports the overlaps at its beginning.
                 let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-                let mut next =
-                    self.gaps(step).predicted_rows(contacts.as_slice(), &poses, &seen, &beginning, &is_hit);
-                next.retain(|row| !stays(row));
-                next.extend(of_contacts.iter().filter(|row| stays(row)).cloned());
-                next.extend_from_slice(&held);
-                next.extend_from_slice(&joints);
-                let of_joints = next.len() - joints.len()..;
-                predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
+                let rows_within = |step: &Step, reach: Reach<'_>, held: &[Row]| {
+                    let contacts = contacts.as_slice();
+                    let (mut next, far) =
+                        self.gaps(step).predicted_rows(contacts, &poses, &seen, &beginning, &is_hit, reach);
+                    next.retain(|row| !stays(row));
+                    next.extend(of_contacts.iter().filter(|row| stays(row)).cloned());
+                    next.extend_from_slice(held);
+                    next.extend_from_slice(&joints);
+                    let of_joints = next.len() - joints.len()..;
+                    predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
+                    (next, far)
+                };
                 if let Some(hit) = hit {
+                    let (next, _) = rows_within(step, Reach::All, &held);
                     let motion = stiffened.as_ref().unwrap_or(&plain);
                     let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
                     let (_, forces) =
@@ -678,13 +718,24 @@ impl Newton {
                 found_at.clone_from(&velocities);
                 let last = later.as_ref().unwrap_or(&first);
                 stiffened = plain.stiffened(&loads(last, &forces), &found_at, &from);
-                let guess = carry_rows(last, &forces, &next);
-                let rows = &*later.insert(next);
                 let motion = stiffened.as_ref().unwrap_or(&plain);
-                let before = velocities;
-                (velocities, forces) =
-                    self.solve(step, motion, rows, Gap::Position, from_last(&before, &guess));
-                if self.farthest(step, &before, &velocities) < self.options.settled {
+                let before = velocities.clone();
+                let (converged, residual) = (step.report.converged, step.report.residual);
+                let mut reach = near;
+                loop {
+                    let next;
+                    (next, far) = rows_within(step, reach, &held);
+                    let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
+                    let rows = &*later.insert(next);
+                    let guess = from_last(&velocities, &guess);
+                    (velocities, forces) = self.solve(step, motion, rows, Gap::Position, guess);
+                    if !far.closes(&velocities, step.h) {
+                        break;
+                    }
+                    (step.report.converged, step.report.residual) = (converged, residual);
+                    reach = Reach::All;
+                }
+                if self.ways(step, &before, &velocities).fold(0.0, f64::max) < self.options.settled {
                     break;
                 }
             }
@@ -698,11 +749,19 @@ impl Newton {
             true => self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)).0,
             false => velocities.clone(),
         };
+        if far.closes(velocities, step.h) || far.closes(&carried, step.h) {
+            return Ok(None);
+        }
         let Iterate { rows, velocities, forces, plain, .. } = solved;
         self.kept.keep(&rows, forces);
         let carried = step.ended(&plain, &velocities, &carried);
-        Ok([velocities, carried])
+        Ok(Some([velocities, carried]))
     }
+}
+
+/// Whether a row has one of the `deep` bodies.
+fn is_deep(row: &Row, deep: &[bool]) -> bool {
+    row.sides.iter().flatten().any(|(k, _)| deep[*k])
 }
 
 /// The forces of the rows `before` for `rows`.

@@ -6,6 +6,7 @@ use nalgebra::Vector6;
 use tesdf::collide::{Contact, InstanceId, Mode, Pose};
 
 use super::NewtonOptions;
+use super::far::{Far, Reach};
 use super::normals::normals;
 use super::rows::{Bodies, Center, Row};
 use super::step::Step;
@@ -63,6 +64,8 @@ struct Pair {
     friction: f64,
     skin: f64,
     motions: [BodyMotion; 2],
+    /// The gap up to which contacts get rows, m.
+    reach: f64,
 }
 
 /// The motion of a body.
@@ -114,8 +117,15 @@ impl<'a> Gaps<'a> {
     }
 
     /// The contacts that were detected at `poses` and have a free body, and the row of each, whose
-    /// gap is the distance above the skin.
-    pub fn find<'c>(&self, contacts: &'c [Contact], poses: &[Pose]) -> (Vec<Found<'c>>, Vec<Row>) {
+    /// gap is the distance above the skin. Without rows are those that `reach` does not reach when bodies
+    /// go on for `time` seconds with the velocities of the beginning of the step.
+    pub fn find<'c>(
+        &self,
+        contacts: &'c [Contact],
+        poses: &[Pose],
+        reach: Reach<'_>,
+        time: f64,
+    ) -> (Vec<Found<'c>>, Vec<Row>, Far) {
         let normals = match self.mode {
             Mode::Node => Some(normals(contacts)),
             // Those of the detection are in the normal cones.
@@ -123,7 +133,7 @@ impl<'a> Gaps<'a> {
         };
         // Others follow the rows of contacts.
         let mut rows = Vec::with_capacity(contacts.len() + OTHERS);
-        let mut found = Vec::with_capacity(contacts.len());
+        let (mut found, mut far) = (Vec::with_capacity(contacts.len()), Far::default());
         let mut last: Option<(InstanceId, InstanceId, Pair)> = None;
         for (k, contact) in contacts.iter().enumerate() {
             let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);
@@ -132,34 +142,43 @@ impl<'a> Gaps<'a> {
             let pair = match &last {
                 Some((c, d, pair)) if (*c, *d) == (a, b) => pair,
                 _ => {
-                    let Some(pair) = self.pair(a, b, poses) else { continue };
+                    let Some(pair) = self.pair(a, b, poses, reach) else { continue };
                     &last.insert((a, b, pair)).2
                 }
             };
-            let Pair { centers, friction, skin, motions } = pair;
+            let Pair { centers, friction, skin, motions, reach } = pair;
+            if *centers == [None; 2] {
+                continue;
+            }
+            let at = |motion: &BodyMotion| motion.at(contact.point_a);
+            let of_kinematic =
+                |motion: &BodyMotion| if motion.is_kinematic { at(motion) } else { DVec3::ZERO };
+            let relative = at(&motions[0]) - at(&motions[1]);
+            let carrying = of_kinematic(&motions[0]) - of_kinematic(&motions[1]);
+            let gap = contact.distance - skin;
+            if gap + time * relative.dot(normal) > *reach {
+                far.push(gap + time * carrying.dot(normal), normal, contact.point_a, centers);
+                continue;
+            }
             let Some(mut row) = Row::of_contact(contact, normal, centers, *friction, self.options.stiffness)
             else {
                 continue;
             };
-            let at = |motion: &BodyMotion| motion.at(contact.point_a);
-            let carried = |motion: &BodyMotion| {
-                if motion.is_kinematic { self.step.h * at(motion) } else { DVec3::ZERO }
-            };
-            let carried = carried(&motions[0]) - carried(&motions[1]);
+            let carried = self.step.h * carrying;
             if let Some(friction) = &mut row.friction {
                 friction.way = carried.reject_from_normalized(normal);
             }
             row.gap -= skin;
-            let slip = (at(&motions[0]) - at(&motions[1])).reject_from_normalized(normal);
+            let slip = relative.reject_from_normalized(normal);
             let (carried, way) = (carried.dot(normal), self.step.h * slip.length());
             rows.push(row);
             found.push(Found { contact, normal, carried, skin: *skin, way });
         }
-        (found, rows)
+        (found, rows, far)
     }
 
     /// What contacts of these instances, found at `poses`, have in common.
-    fn pair(&self, a: InstanceId, b: InstanceId, poses: &[Pose]) -> Option<Pair> {
+    fn pair(&self, a: InstanceId, b: InstanceId, poses: &[Pose], reach: Reach<'_>) -> Option<Pair> {
         let bodies = [self.system.body_of(a)?, self.system.body_of(b)?];
         let center = |body: usize| match self.system.bodies()[body].mass {
             Mass::Free(mass) => {
@@ -167,8 +186,10 @@ impl<'a> Gaps<'a> {
             }
             Mass::Fixed | Mass::Kinematic => None,
         };
+        let centers = bodies.map(center);
         Some(Pair {
-            centers: bodies.map(center),
+            reach: reach.between(&centers),
+            centers,
             friction: self.system.friction(bodies[0], bodies[1]),
             skin: self.skin(bodies[0], bodies[1]),
             motions: bodies.map(|body| self.motion(body, poses)),
@@ -224,8 +245,10 @@ impl<'a> Gaps<'a> {
         velocities: &[Vector6<f64>],
         Beginning { depths, before }: &Beginning<'_>,
         is_hit: &[bool],
-    ) -> Vec<Row> {
-        let (found, mut rows) = self.find(contacts, poses);
+        reach: Reach<'_>,
+    ) -> (Vec<Row>, Far) {
+        let (found, mut rows, mut far) = self.find(contacts, poses, reach, 0.0);
+        far.extrapolate(velocities, self.step.h);
         for (found, row) in found.iter().zip(&mut rows) {
             let point = self.point_of_a(found.contact, poses);
             if let Some(before) = point.and_then(|point| before.of(found, point)) {
@@ -249,7 +272,7 @@ impl<'a> Gaps<'a> {
                 row.relaxed_gap = row.relaxed_gap.max(found.carried.min(0.0));
             }
         }
-        rows
+        (rows, far)
     }
 
     /// What [`predicted_rows`](Self::predicted_rows) needs of the `contacts` at the beginning of

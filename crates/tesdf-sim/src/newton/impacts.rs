@@ -9,6 +9,7 @@ use nalgebra::Vector6;
 use tesdf::collide::{HiddenSearch, Pose};
 
 use super::Newton;
+use super::far::Reach;
 use super::gaps::Found;
 use super::rows::{Row, RowForce};
 use super::step::Step;
@@ -57,7 +58,7 @@ impl Newton {
             let predicted = self.moved(step, &hit.velocities);
             let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
             let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-            let (found, rows) = self.gaps(step).find(contacts.as_slice(), &poses);
+            let (found, rows, _) = self.gaps(step).find(contacts.as_slice(), &poses, Reach::All, 0.0);
             let more = self.gaps(step).shares(&found, &rows, &target, FAR);
             let mut most = 0.0f64;
             for ((share, more), _) in shares.iter_mut().zip(more).zip(&hit.is_hit).filter(|(_, hit)| **hit) {

@@ -27,6 +27,7 @@
 mod chains;
 mod deep;
 mod engine;
+mod far;
 mod gaps;
 mod geometric;
 mod impacts;

@@ -184,7 +184,7 @@ impl Row {
 }
 
 /// The centre of mass of a free body.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Center {
     /// Its index in the list of free bodies.
     pub free: usize,
