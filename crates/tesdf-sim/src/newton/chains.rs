@@ -9,10 +9,10 @@ use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
 use super::Newton;
-use super::engine::{Gap, from_last};
 use super::geometric::{ARM_TURN, Loads, Motion, Start};
 use super::joints::predict;
 use super::rows::{Row, RowForce};
+use super::solve::{Gap, from_last};
 use super::step::Step;
 use crate::{Joint, Mass, State, System};
 

@@ -1,30 +1,21 @@
-use std::collections::BTreeSet;
 use std::time::Instant;
 
 use glam::DVec3;
 use nalgebra::Vector6;
-use rayon::prelude::*;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, InstanceId, Mode, Pose,
-    Scene, Shape, instance_pairs,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Mode, Scene, Shape,
+    instance_pairs,
 };
 
 use super::NewtonOptions;
-use super::chains::Iterate;
-use super::deep::{Surfaces, pair};
-use super::far::Reach;
+use super::deep::Surfaces;
 use super::gaps::Gaps;
-use super::geometric::{Loads, Motion, Start};
 use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
-use super::islands::{Island, islands};
-use super::joints::{joint_rows, predict};
 use super::kept::{FORGETS, Kept};
-use super::line::Placed;
 use super::look::Look;
 use super::passing::Passing;
-use super::problem::{Minimum, Problem};
 use super::rotation::Rotation;
-use super::rows::{FreeBody, Resistance, Row, RowForce, carry};
+use super::rows::FreeBody;
 use super::sleep::Sleep;
 use super::step::Step;
 use crate::{Dynamics, DynamicsError, Mass, Motor, Residual, State, StepReport, System, Wrench};
@@ -65,15 +56,12 @@ pub struct Newton {
     /// Diagonal of each body's bounding box, m.
     pub(super) sizes: Vec<f64>,
     /// For bodies that overlap deeply.
-    surfaces: Surfaces,
+    pub(super) surfaces: Surfaces,
     /// What the last step found at its beginning.
     found: Contacts,
     pub(super) sleep: Sleep,
     pub(super) kept: Kept,
 }
-
-/// The velocities of the free bodies that move the poses, and those that the next step starts from.
-type Velocities = [Vec<Vector6<f64>>; 2];
 
 /// Maximum number of further detections in a step when bodies close faster than was foreseen.
 const MORE_LOOKS: u32 = 8;
@@ -83,13 +71,6 @@ pub const MOST_TURN: f64 = 1.0;
 
 /// A step has at most as many parts because bodies turn far.
 const MOST_PARTS: f64 = 1000.0;
-
-/// Bodies are wild when they are faster than what moves them by this factor.
-const WILD: f64 = 10.0;
-
-/// Fewer rows are solved on the calling thread: that a thread of the pool wakes takes as long as some
-/// hundred rows.
-const ON_ONE_THREAD: usize = 500;
 
 /// Of the times of parts.
 const ROUNDING: f64 = 1e-9;
@@ -109,24 +90,6 @@ struct Part {
     is_loose: bool,
     /// What is reported of it.
     report: StepReport,
-}
-
-/// What a minimisation starts from.
-#[derive(Clone, Copy)]
-pub struct Guess<'a> {
-    /// Of all free bodies.
-    pub velocities: &'a [Vector6<f64>],
-    /// What each row does; `None` where nothing is known.
-    pub forces: Option<&'a [RowForce]>,
-}
-
-/// The two gaps of a row.
-#[derive(Clone, Copy)]
-pub enum Gap {
-    /// Includes the correction that pushes penetrating bodies apart.
-    Position,
-    /// Without that correction.
-    Relaxed,
 }
 
 impl Newton {
@@ -239,149 +202,6 @@ impl Newton {
         Gaps { system, options, sizes, mode: *mode, step }
     }
 
-    /// Whether a contact penetrates too deeply for a linear prediction.
-    fn is_deep(&self, contact: &Contact) -> bool {
-        let bodies = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
-        let size = bodies.iter().flatten().map(|&b| self.sizes[b]).fold(f64::INFINITY, f64::min);
-        -contact.distance > self.options.deep * size
-    }
-
-    /// The pairs that overlap deeply and that no joint holds. None where contacts do not show all
-    /// of an overlap: bodies that do not turn would stay in each other where no vertex is.
-    fn apart(&self, contacts: &[Contact]) -> BTreeSet<[InstanceId; 2]> {
-        if !self.detector.holds_all(&self.collide) {
-            return BTreeSet::new();
-        }
-        let joints = self.system.joints();
-        let is_held = |id: &InstanceId| {
-            let body = self.system.body_of(*id);
-            joints.iter().any(|joint| body == Some(joint.child) || body == joint.parent)
-        };
-        let deep = contacts.iter().filter(|c| self.is_deep(c)).map(pair);
-        deep.filter(|pair| !pair.iter().any(is_held)).collect()
-    }
-
-    /// The bodies of islands that overlap deeply, as [`Step::deep`].
-    fn deep(&self, step: &Step, contacts: &[Contact], rows: &[Row]) -> Vec<bool> {
-        let mut deep = vec![false; step.free.len()];
-        for contact in contacts.iter().filter(|c| self.is_deep(c)) {
-            let bodies = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
-            bodies.iter().flatten().filter_map(|&b| step.free_of[b]).for_each(|k| deep[k] = true);
-        }
-        if !deep.contains(&true) {
-            return deep;
-        }
-        for island in islands(step.free.len(), rows) {
-            if island.bodies.iter().any(|&k| deep[k]) {
-                island.bodies.iter().for_each(|&k| deep[k] = true);
-            }
-        }
-        deep
-    }
-
-    /// Minimises the problem of every island from `guess`. A body without rows keeps its target
-    /// velocity.
-    pub(super) fn solve(
-        &self,
-        step: &mut Step,
-        motion: &Motion,
-        rows: &[Row],
-        gap: Gap,
-        guess: Guess<'_>,
-    ) -> (Vec<Vector6<f64>>, Vec<RowForce>) {
-        let islands = islands(step.free.len(), rows);
-        let minimum = |island: &Island| self.solve_island(step, motion, island, rows, gap, guess);
-        // One thread computes each minimum, and they are collected in order: the bits do not depend
-        // on the number of threads.
-        let minima: Vec<Minimum> = match islands.len() > 1 && rows.len() >= ON_ONE_THREAD {
-            true => islands.par_iter().map(minimum).collect(),
-            false => islands.iter().map(minimum).collect(),
-        };
-        let (mut velocities, mut forces) = (motion.target.clone(), vec![RowForce::default(); rows.len()]);
-        let report = &mut step.report;
-        report.islands = islands.len();
-        let mut slowest = 0;
-        for (island, minimum) in islands.iter().zip(minima) {
-            island.bodies.iter().zip(minimum.velocity).for_each(|(&k, v)| velocities[k] = v);
-            island.rows.iter().zip(minimum.forces).for_each(|(&k, force)| forces[k] = force);
-            slowest = slowest.max(minimum.iterations);
-            report.converged &= minimum.converged;
-            report.residual = report.residual.max(minimum.residual);
-        }
-        report.iterations += slowest;
-        (velocities, forces)
-    }
-
-    fn solve_island(
-        &self,
-        step: &Step,
-        motion: &Motion,
-        island: &Island,
-        rows: &[Row],
-        gap: Gap,
-        guess: Guess<'_>,
-    ) -> Minimum {
-        // Rows that part bodies in place of those that were found.
-        let mut parting = Vec::new();
-        if matches!(gap, Gap::Position) {
-            let parts =
-                island.rows.iter().map(|&k| &rows[k]).filter(|row| row.resistance == Resistance::Parting);
-            parting.extend(parts.map(Row::parting));
-        }
-        let mut parting = parting.iter();
-        let place = |row: &Row| {
-            // Every free body of an island's rows is in `island.bodies`, which is sorted.
-            row.sides.map(|side| side.map(|(body, _)| island.bodies.partition_point(|b| *b < body)))
-        };
-        let placed = |&k: &usize| {
-            let row = &rows[k];
-            let (row, gap) = match (gap, row.resistance) {
-                (Gap::Position, Resistance::Parting) => (parting.next().unwrap_or(row), row.gap),
-                (Gap::Position, _) => (row, row.gap),
-                (Gap::Relaxed, _) => (row, row.relaxed_gap),
-            };
-            Placed { row, bodies: place(row), gap, resistance: row.resistance }
-        };
-        let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
-        let inertia: Vec<_> = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
-        let placed: Vec<_> = island.rows.iter().map(placed).collect();
-        let of_rows = |forces: &[RowForce]| island.rows.iter().map(|&k| forces[k]).collect::<Vec<_>>();
-        let (start, forces) = (of(guess.velocities), guess.forces.map(of_rows));
-        // Where nothing touched before, nothing is known.
-        let forces = forces.filter(|forces| forces.iter().any(|force| force.along != 0.0));
-        let asked = placed.iter().map(|placed| placed.gap.abs() / step.h).fold(0.0, f64::max);
-        let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
-        let minimum = problem.minimise(start.clone(), forces.as_deref());
-        match self.is_wild(step, island, asked, [&of(&motion.target), &start], &minimum.velocity) {
-            true => Minimum { converged: false, ..problem.softened().minimise(start, None) },
-            false => minimum,
-        }
-    }
-
-    /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows
-    /// ask for, m/s or rad/s. Then rigid contacts contradict each other: a box between a plane and
-    /// a press that were 0.16 mm too near for it left sideways at 2 km/s, because its two sides
-    /// were touched along directions that differed by 70 µrad.
-    fn is_wild(
-        &self,
-        step: &Step,
-        island: &Island,
-        asked: f64,
-        known: [&[Vector6<f64>]; 2],
-        found: &[Vector6<f64>],
-    ) -> bool {
-        let sizes = || island.bodies.iter().map(|&k| self.sizes[step.free[k].body]);
-        let fastest = |velocities: &[Vector6<f64>]| {
-            let speed = |(v, size): (&Vector6<f64>, f64)| {
-                let (linear, angular) = unpack(v);
-                linear.length() + size * angular.length()
-            };
-            velocities.iter().zip(sizes()).map(speed).fold(0.0, f64::max)
-        };
-        let asked = asked * sizes().fold(1.0, f64::max);
-        fastest(found) > WILD * (asked + fastest(known[0]).max(fastest(known[1])))
-    }
-
     /// Detects as far ahead as the velocities of `ahead` move the bodies.
     fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
         let contacts = self.detect(step, ahead, HiddenSearch::On)?;
@@ -459,20 +279,6 @@ impl Newton {
         let is_odd = |body: usize| place[body].is_some_and(|place| place % 2 == 1);
         (0..own.len()).filter(|&body| is_odd(body)).for_each(|body| ahead[body] = own[body]);
         Ok(place.iter().any(Option::is_some))
-    }
-
-    /// For each free body a bound of the way between the points that these velocities move in a step,
-    /// m.
-    fn ways<'a>(
-        &'a self,
-        step: &'a Step,
-        from: &'a [Vector6<f64>],
-        to: &'a [Vector6<f64>],
-    ) -> impl Iterator<Item = f64> + 'a {
-        step.free.iter().zip(from).zip(to).map(|((free, from), to)| {
-            let (linear, angular) = unpack(&(to - from));
-            step.h * (linear.length() + self.sizes[free.body] * angular.length())
-        })
     }
 
     /// Whether a body has no directions.
@@ -594,184 +400,6 @@ impl Newton {
         report.asleep = self.end_sleep(whole, &touching)?;
         Ok(report)
     }
-
-    /// The velocities that move the poses, and the velocities that the next step starts from.
-    fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
-        let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
-        let ways: Vec<f64> = self.ways(step, &start, &step.target).collect();
-        let mut reach = Reach::Near(&ways);
-        loop {
-            let (converged, residual) = (step.report.converged, step.report.residual);
-            if let Some(found) = self.velocities_within(step, contacts, &start, reach)? {
-                return Ok(found);
-            }
-            (step.report.converged, step.report.residual) = (converged, residual);
-            reach = Reach::All;
-        }
-    }
-
-    /// The same, with rows of the contacts within `near` and of those that a minimisation closes. Returns
-    /// `None` where the last of them are closed after all.
-    fn velocities_within(
-        &mut self,
-        step: &mut Step,
-        contacts: &[Contact],
-        start: &[Vector6<f64>],
-        near: Reach<'_>,
-    ) -> Result<Option<Velocities>, DynamicsError> {
-        let all = contacts;
-        let contacts = &*self.surfaces.acting(self.system.scene(), all, |c| self.is_deep(c));
-        let joints = joint_rows(&self.gaps(step).bodies(), step.h);
-        // Where bodies overlap deeply, rigid contacts would contradict each other.
-        let apart = self.apart(all);
-        let mut plain = Motion::new(&step.free, &step.target);
-        let count = step.free.len();
-        let loads =
-            |rows: &[Row], forces: &[RowForce]| Loads::new(count, rows, forces, rows.len() - joints.len());
-        let from = Start { velocities: start, h: step.h, whole: step.whole };
-        let mut found_at = vec![Vector6::zeros(); count];
-        let mut reach = near;
-        // Rows of the contacts, then those of the joints.
-        let (found, first, mut far, mut velocities, mut forces, mut stiffened) = loop {
-            let (found, mut first, far) = self.gaps(step).find(contacts, &step.poses, reach, step.h);
-            self.gaps(step).begin(&found, &mut first);
-            first.extend_from_slice(&joints);
-            step.deep = self.deep(step, all, &first);
-            for (row, found) in first.iter_mut().zip(&found).filter(|(row, _)| is_deep(row, &step.deep)) {
-                let parts = apart.contains(&pair(found.contact));
-                row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
-            }
-            let (converged, residual) = (step.report.converged, step.report.residual);
-            let kept = self.kept.of(&first);
-            let of_kept =
-                kept.as_deref().and_then(|kept| plain.stiffened(&loads(&first, kept), &found_at, &from));
-            let motion = of_kept.as_ref().unwrap_or(&plain);
-            let guess = Guess { velocities: start, forces: kept.as_deref() };
-            let (mut velocities, mut forces) = self.solve(step, motion, &first, Gap::Position, guess);
-            let stiffened = plain.stiffened(&loads(&first, &forces), &found_at, &from);
-            let again = stiffened.as_ref().unwrap_or(&plain);
-            if again.differs(motion, &plain) {
-                (velocities, forces) =
-                    self.solve(step, again, &first, Gap::Position, from_last(&velocities, &forces));
-            }
-            if !far.closes(&velocities, step.h) {
-                break (found, first, far, velocities, forces, stiffened);
-            }
-            (step.report.converged, step.report.residual) = (converged, residual);
-            reach = Reach::All;
-        };
-        let of_contacts = &first[..found.len()];
-        // Those of the last detection.
-        let mut later: Option<Vec<Row>> = None;
-        // A deep body that is pushed into another one must not kick it, so what is detected again
-        // says nothing about deep bodies.
-        let deep = step.deep.clone();
-        let stays = |row: &Row| is_deep(row, &deep);
-        // The contacts at which bodies are hit, found where they are hit.
-        let mut held: Vec<Row> = Vec::new();
-        if first.iter().any(|row| !stays(row)) {
-            let beginning = self.gaps(step).beginning(contacts, &found, of_contacts);
-            let mut hit = match self.options.redetections {
-                0 => None,
-                _ => self.hit(step, &found, of_contacts, &velocities)?,
-            };
-            let mut round = 0;
-            while round < self.options.redetections {
-                // The first round, if any, is at the hits. The poses at the end of the step are
-                // predicted from its beginning all the same: a body may turn far after it was hit.
-                let hit = hit.take();
-                round += u32::from(hit.is_none());
-                let seen = hit.as_ref().map_or(&velocities, |hit| &hit.velocities).clone();
-                let is_hit = hit.as_ref().map_or(vec![false; seen.len()], |hit| hit.is_hit.clone());
-                let mut predicted = self.moved(step, &seen);
-                // The contacts of these bodies stay, so the detection need not look as far as they
-                // are pushed.
-                for (k, free) in step.free.iter().enumerate().filter(|(k, _)| deep[*k]) {
-                    let seen = &mut predicted[free.body];
-                    (seen.linear, seen.angular) = unpack(&step.target[k]);
-                }
-                // A step reports the overlaps at its beginning.
-                let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
-                let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-                let rows_within = |step: &Step, reach: Reach<'_>, held: &[Row]| {
-                    let contacts = contacts.as_slice();
-                    let (mut next, far) =
-                        self.gaps(step).predicted_rows(contacts, &poses, &seen, &beginning, &is_hit, reach);
-                    next.retain(|row| !stays(row));
-                    next.extend(of_contacts.iter().filter(|row| stays(row)).cloned());
-                    next.extend_from_slice(held);
-                    next.extend_from_slice(&joints);
-                    let of_joints = next.len() - joints.len()..;
-                    predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
-                    (next, far)
-                };
-                if let Some(hit) = hit {
-                    let (next, _) = rows_within(step, Reach::All, &held);
-                    let motion = stiffened.as_ref().unwrap_or(&plain);
-                    let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
-                    let (_, forces) =
-                        self.solve(step, motion, &next, Gap::Position, from_last(&velocities, &guess));
-                    held = hit.held(&next, &forces, stays);
-                    continue;
-                }
-                step.turn(&mut plain, &velocities);
-                found_at.clone_from(&velocities);
-                let last = later.as_ref().unwrap_or(&first);
-                stiffened = plain.stiffened(&loads(last, &forces), &found_at, &from);
-                let motion = stiffened.as_ref().unwrap_or(&plain);
-                let before = velocities.clone();
-                let (converged, residual) = (step.report.converged, step.report.residual);
-                let mut reach = near;
-                loop {
-                    let next;
-                    (next, far) = rows_within(step, reach, &held);
-                    let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
-                    let rows = &*later.insert(next);
-                    let guess = from_last(&velocities, &guess);
-                    (velocities, forces) = self.solve(step, motion, rows, Gap::Position, guess);
-                    if !far.closes(&velocities, step.h) {
-                        break;
-                    }
-                    (step.report.converged, step.report.residual) = (converged, residual);
-                    reach = Reach::All;
-                }
-                if self.ways(step, &before, &velocities).fold(0.0, f64::max) < self.options.settled {
-                    break;
-                }
-            }
-        }
-        let rows = later.unwrap_or(first);
-        let of_joints = rows.len() - joints.len();
-        let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
-        self.close_joints(step, &mut solved, of_joints, &from);
-        let Iterate { rows, velocities, forces, .. } = &solved;
-        let carried = match rows.iter().any(|row| row.relaxed_gap != row.gap) {
-            true => self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)).0,
-            false => velocities.clone(),
-        };
-        if far.closes(velocities, step.h) || far.closes(&carried, step.h) {
-            return Ok(None);
-        }
-        let Iterate { rows, velocities, forces, plain, .. } = solved;
-        self.kept.keep(&rows, forces);
-        let carried = step.ended(&plain, &velocities, &carried);
-        Ok(Some([velocities, carried]))
-    }
-}
-
-/// Whether a row has one of the `deep` bodies.
-fn is_deep(row: &Row, deep: &[bool]) -> bool {
-    row.sides.iter().flatten().any(|(k, _)| deep[*k])
-}
-
-/// The forces of the rows `before` for `rows`.
-fn carry_rows(before: &[Row], forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
-    carry(before.iter().map(|row| row.id), forces, rows)
-}
-
-/// A minimisation that starts from the last one.
-pub fn from_last<'a>(velocities: &'a [Vector6<f64>], forces: &'a [RowForce]) -> Guess<'a> {
-    Guess { velocities, forces: Some(forces) }
 }
 
 /// Gives the free bodies these velocities.

@@ -87,3 +87,40 @@ impl FarContact {
         self.normal.dot(of_point(&centers[0]) - of_point(&centers[1]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::newton::integrate::pack;
+
+    const H: f64 = 5e-3;
+
+    /// A contact 1 mm above a body that rises and turns, as seen from a body that stays.
+    #[test]
+    fn a_far_contact_closes_when_its_row_would() {
+        let center = |free: usize, x: f64| Some(Center { free, place: DVec3::new(x, 0.0, 0.0) });
+        let mut far = Far::default();
+        far.push(1e-3, DVec3::Z, DVec3::new(0.1, 0.0, 0.0), &[center(0, 0.0), center(1, 0.2)]);
+        let velocities = |rise: f64, turn: f64| {
+            [pack(DVec3::ZERO, DVec3::ZERO), pack(rise * DVec3::Z, DVec3::new(0.0, turn, 0.0))]
+        };
+        // The point is at -0.1 m of the turning body, so it rises by 0.1 m a rad.
+        for (rise, turn, closes) in
+            [(0.0, 0.0, false), (0.19, 0.0, false), (0.21, 0.0, true), (0.0, 1.9, false), (0.0, 2.1, true)]
+        {
+            assert_eq!(far.closes(&velocities(rise, turn), H), closes, "{rise} m/s, {turn} rad/s");
+        }
+        // Seen at the end of a motion, it was as much farther.
+        far.extrapolate(&velocities(0.1, 0.0), H);
+        assert!(!far.closes(&velocities(0.29, 0.0), H) && far.closes(&velocities(0.31, 0.0), H));
+    }
+
+    #[test]
+    fn the_reach_follows_the_ways_of_both_bodies() {
+        let center = |free| Some(Center { free, place: DVec3::ZERO });
+        let near = Reach::Near(&[1e-3, 3e-3]);
+        assert_eq!(near.between(&[center(0), None]), NEAR * 1e-3);
+        assert_eq!(near.between(&[center(0), center(1)]), NEAR * 4e-3);
+        assert_eq!(Reach::All.between(&[center(0), None]), f64::INFINITY);
+    }
+}

@@ -48,7 +48,9 @@ mod relative;
 mod rotation;
 mod rows;
 mod sleep;
+mod solve;
 mod step;
+mod velocities;
 
 pub use engine::{Detect, Newton};
 pub use options::NewtonOptions;

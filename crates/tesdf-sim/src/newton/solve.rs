@@ -1,0 +1,152 @@
+//! Minimises the problems of all islands.
+use nalgebra::Vector6;
+use rayon::prelude::*;
+
+use super::Newton;
+use super::geometric::Motion;
+use super::integrate::unpack;
+use super::islands::{Island, islands};
+use super::line::Placed;
+use super::problem::{Minimum, Problem};
+use super::rows::{Resistance, Row, RowForce, carry};
+use super::step::Step;
+
+/// Bodies are wild when they are faster than what moves them by this factor.
+const WILD: f64 = 10.0;
+
+/// Fewer rows are solved on the calling thread: that a thread of the pool wakes takes as long as some
+/// hundred rows.
+const ON_ONE_THREAD: usize = 500;
+
+/// What a minimisation starts from.
+#[derive(Clone, Copy)]
+pub struct Guess<'a> {
+    /// Of all free bodies.
+    pub velocities: &'a [Vector6<f64>],
+    /// What each row does; `None` where nothing is known.
+    pub forces: Option<&'a [RowForce]>,
+}
+
+/// The two gaps of a row.
+#[derive(Clone, Copy)]
+pub enum Gap {
+    /// Includes the correction that pushes penetrating bodies apart.
+    Position,
+    /// Without that correction.
+    Relaxed,
+}
+
+impl Newton {
+    /// Minimises the problem of every island from `guess`. A body without rows keeps its target
+    /// velocity.
+    pub(super) fn solve(
+        &self,
+        step: &mut Step,
+        motion: &Motion,
+        rows: &[Row],
+        gap: Gap,
+        guess: Guess<'_>,
+    ) -> (Vec<Vector6<f64>>, Vec<RowForce>) {
+        let islands = islands(step.free.len(), rows);
+        let minimum = |island: &Island| self.solve_island(step, motion, island, rows, gap, guess);
+        // One thread computes each minimum, and they are collected in order: the bits do not depend
+        // on the number of threads.
+        let minima: Vec<Minimum> = match islands.len() > 1 && rows.len() >= ON_ONE_THREAD {
+            true => islands.par_iter().map(minimum).collect(),
+            false => islands.iter().map(minimum).collect(),
+        };
+        let (mut velocities, mut forces) = (motion.target.clone(), vec![RowForce::default(); rows.len()]);
+        let report = &mut step.report;
+        report.islands = islands.len();
+        let mut slowest = 0;
+        for (island, minimum) in islands.iter().zip(minima) {
+            island.bodies.iter().zip(minimum.velocity).for_each(|(&k, v)| velocities[k] = v);
+            island.rows.iter().zip(minimum.forces).for_each(|(&k, force)| forces[k] = force);
+            slowest = slowest.max(minimum.iterations);
+            report.converged &= minimum.converged;
+            report.residual = report.residual.max(minimum.residual);
+        }
+        report.iterations += slowest;
+        (velocities, forces)
+    }
+
+    fn solve_island(
+        &self,
+        step: &Step,
+        motion: &Motion,
+        island: &Island,
+        rows: &[Row],
+        gap: Gap,
+        guess: Guess<'_>,
+    ) -> Minimum {
+        // Rows that part bodies in place of those that were found.
+        let mut parting = Vec::new();
+        if matches!(gap, Gap::Position) {
+            let parts =
+                island.rows.iter().map(|&k| &rows[k]).filter(|row| row.resistance == Resistance::Parting);
+            parting.extend(parts.map(Row::parting));
+        }
+        let mut parting = parting.iter();
+        let place = |row: &Row| {
+            // Every free body of an island's rows is in `island.bodies`, which is sorted.
+            row.sides.map(|side| side.map(|(body, _)| island.bodies.partition_point(|b| *b < body)))
+        };
+        let placed = |&k: &usize| {
+            let row = &rows[k];
+            let (row, gap) = match (gap, row.resistance) {
+                (Gap::Position, Resistance::Parting) => (parting.next().unwrap_or(row), row.gap),
+                (Gap::Position, _) => (row, row.gap),
+                (Gap::Relaxed, _) => (row, row.relaxed_gap),
+            };
+            Placed { row, bodies: place(row), gap, resistance: row.resistance }
+        };
+        let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
+        let inertia: Vec<_> = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
+        let placed: Vec<_> = island.rows.iter().map(placed).collect();
+        let of_rows = |forces: &[RowForce]| island.rows.iter().map(|&k| forces[k]).collect::<Vec<_>>();
+        let (start, forces) = (of(guess.velocities), guess.forces.map(of_rows));
+        // Where nothing touched before, nothing is known.
+        let forces = forces.filter(|forces| forces.iter().any(|force| force.along != 0.0));
+        let asked = placed.iter().map(|placed| placed.gap.abs() / step.h).fold(0.0, f64::max);
+        let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
+        let minimum = problem.minimise(start.clone(), forces.as_deref());
+        match self.is_wild(step, island, asked, [&of(&motion.target), &start], &minimum.velocity) {
+            true => Minimum { converged: false, ..problem.softened().minimise(start, None) },
+            false => minimum,
+        }
+    }
+
+    /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows
+    /// ask for, m/s or rad/s. Then rigid contacts contradict each other: a box between a plane and
+    /// a press that were 0.16 mm too near for it left sideways at 2 km/s, because its two sides
+    /// were touched along directions that differed by 70 µrad.
+    fn is_wild(
+        &self,
+        step: &Step,
+        island: &Island,
+        asked: f64,
+        known: [&[Vector6<f64>]; 2],
+        found: &[Vector6<f64>],
+    ) -> bool {
+        let sizes = || island.bodies.iter().map(|&k| self.sizes[step.free[k].body]);
+        let fastest = |velocities: &[Vector6<f64>]| {
+            let speed = |(v, size): (&Vector6<f64>, f64)| {
+                let (linear, angular) = unpack(v);
+                linear.length() + size * angular.length()
+            };
+            velocities.iter().zip(sizes()).map(speed).fold(0.0, f64::max)
+        };
+        let asked = asked * sizes().fold(1.0, f64::max);
+        fastest(found) > WILD * (asked + fastest(known[0]).max(fastest(known[1])))
+    }
+}
+
+/// The forces of the rows `before` for `rows`.
+pub fn carry_rows(before: &[Row], forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
+    carry(before.iter().map(|row| row.id), forces, rows)
+}
+
+/// A minimisation that starts from the last one.
+pub fn from_last<'a>(velocities: &'a [Vector6<f64>], forces: &'a [RowForce]) -> Guess<'a> {
+    Guess { velocities, forces: Some(forces) }
+}
