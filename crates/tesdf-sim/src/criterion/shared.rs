@@ -88,8 +88,7 @@ impl Penetration {
     /// As [`measure`](Self::measure), of all pairs whose bounds overlap at the current states.
     pub(super) fn measure_all(&mut self, system: &System, tolerance: f64) {
         let measured = at_states(system, |system| {
-            let pairs = instance_pairs(system.scene(), 0.0, 0.0).map_err(|e| e.to_string())?;
-            let pairs: Vec<_> = pairs.iter().map(|pair| [pair.first, pair.second]).collect();
+            let pairs = pairs_within(system, 0.0)?;
             self.deepen(system, &pairs, tolerance)
         });
         self.unmeasured.extend(measured.err());
@@ -146,10 +145,13 @@ pub(super) fn least_distance(
 
 /// The pairs of instances whose bounds come within `distance` metres at the current states.
 pub(super) fn near(system: &System, distance: f64) -> Result<Vec<[InstanceId; 2]>, String> {
-    at_states(system, |system| {
-        let pairs = instance_pairs(system.scene(), distance, 0.0).map_err(|e| e.to_string())?;
-        Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
-    })
+    at_states(system, |system| pairs_within(system, distance))
+}
+
+/// The same, where the instances have the poses of those states.
+fn pairs_within(system: &System, distance: f64) -> Result<Vec<[InstanceId; 2]>, String> {
+    let pairs = instance_pairs(system.scene(), distance, 0.0).map_err(|e| e.to_string())?;
+    Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
 }
 
 /// Measures a system whose instances have the poses of its states: otherwise they have those of the

@@ -18,8 +18,8 @@ const CLOSED: f64 = 1e-10;
 pub enum Reach<'a> {
     /// All of them.
     All,
-    /// Those that the foreseen motion leaves nearer than a share of these ways, m, by which free bodies
-    /// may differ from it.
+    /// Those that the foreseen motion leaves nearer than a share of these ways, m, by which free
+    /// bodies may differ from it.
     Near(&'a [f64]),
 }
 

@@ -117,8 +117,8 @@ impl<'a> Gaps<'a> {
     }
 
     /// The contacts that were detected at `poses` and have a free body, and the row of each, whose
-    /// gap is the distance above the skin. Without rows are those that `reach` does not reach when bodies
-    /// go on for `time` seconds with the velocities of the beginning of the step.
+    /// gap is the distance above the skin. Without rows are those that `reach` does not reach when
+    /// bodies go on for `time` seconds with the velocities of the beginning of the step.
     pub fn find<'c>(
         &self,
         contacts: &'c [Contact],

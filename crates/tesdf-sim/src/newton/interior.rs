@@ -91,8 +91,8 @@ struct Effort {
 
 /// An iterate is the solution when the last iteration moved no body by more than this, m.
 const SETTLED: f64 = 1e-10;
-/// The same for one that begins near the solution, where its first iterations are as short. With 0.1 nm,
-/// the friction of a stack did not end its creeping, which grew by 60 nm/s in a second.
+/// The same for one that begins near the solution, where its first iterations are as short. With
+/// 0.1 nm, the friction of a stack did not end its creeping, which grew by 60 nm/s in a second.
 const SETTLED_WARM: f64 = 1e-12;
 
 /// From forces that may be nearly right.
@@ -282,12 +282,9 @@ impl Interior<'_> {
             for k in batch.bundles.clone() {
                 let (bundle, forces) = (&self.lines.bundles[k], &forces[k]);
                 bundle.act(forces.push, forces.friction, &mut acting);
-                // A force is right when a spring that keeps it finds it again.
-                let again = forces.push - bundle.left(&relative, forces.push);
+                let gap = bundle.left(&relative, forces.push);
                 for lane in 0..bundle.rows().len() {
-                    let [low, high] = bundle.bounds.map(|bound| bound.0[lane]);
-                    let off = again.0[lane].max(low).min(high) - forces.push.0[lane];
-                    worst = greater(off.abs() / bundle.scale.0[lane], worst);
+                    worst = greater(bundle.off(lane, gap, forces.push), worst);
                 }
             }
             group.act(acting.map(Lanes::sum), &mut momentum);
@@ -308,14 +305,13 @@ impl Interior<'_> {
             let push = forces[k].push;
             let gap = bundle.left(&relative, push);
             for lane in (0..bundle.rows().len()).filter(|&lane| bundle.count_bounds(lane) > 0) {
+                worst = f64::max(worst, bundle.off(lane, gap, push));
                 let [low, high] = bundle.bounds.map(|bound| bound.0[lane]);
                 let (gap, push) = (gap.0[lane], push.0[lane]);
                 let is_low = high == f64::INFINITY || gap > 0.0 && low > f64::NEG_INFINITY;
                 let room = if is_low { push - low } else { high - push };
                 products += (gap * room).abs();
                 count += 1.0;
-                let off = (push - gap).max(low).min(high) - push;
-                worst = f64::max(worst, off.abs() / bundle.scale.0[lane]);
             }
         }
         let centre = FIRST_WARM * (products / f64::max(count, 1.0)).max(self.mean_square(worst));

@@ -1,8 +1,8 @@
 //! The forces of the last step, from which the first minimisation of a step begins: bodies that
 //! rest or are carried have nearly the same forces in each step.
 //!
-//! They are no part of the state of a run: every [`FORGETS`] steps a step begins without them. So a run
-//! that is continued makes the steps since then again, and gets the same bytes.
+//! They are no part of the state of a run: every [`FORGETS`] steps a step begins without them. So a
+//! run that is continued makes the steps since then again, and gets the same bytes.
 use super::rows::{Row, RowForce, RowId, carry};
 
 /// Steps whose number is a multiple of this begin without forces.

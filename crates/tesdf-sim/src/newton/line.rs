@@ -334,6 +334,14 @@ impl Bundle {
         self.at(relative) + self.compliance * push
     }
 
+    /// How far a force is from being right, as a way, m: from the force that a spring that keeps it
+    /// finds with the gap that is left.
+    pub fn off(&self, lane: usize, left: Lanes, push: Lanes) -> f64 {
+        let [low, high] = self.bounds.map(|bound| bound.0[lane]);
+        let again = push.0[lane] - left.0[lane];
+        (again.max(low).min(high) - push.0[lane]).abs() / self.scale.0[lane]
+    }
+
     /// How far the gaps are from ones that need no force.
     pub fn violation(&self, relative: &[f64; 6]) -> f64 {
         let gap = self.at(relative);
