@@ -151,8 +151,8 @@ impl Newton {
         }
         let poses = states.iter().map(|state| state.pose).collect();
         let report = StepReport { converged: true, ..StepReport::default() };
-        let deep = vec![false; free.len()];
-        Step { h, whole, poses, free, free_of, target, rotations, deep, report }
+        let [deep, resting] = [(); 2].map(|()| vec![false; free.len()]);
+        Step { h, whole, poses, free, free_of, target, rotations, deep, resting, report }
     }
 
     /// The states after moving for one step at `velocities`. Their velocities are `velocities`.

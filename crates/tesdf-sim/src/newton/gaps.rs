@@ -9,6 +9,7 @@ use super::NewtonOptions;
 use super::far::{Far, Reach};
 use super::normals::normals;
 use super::rows::{Bodies, Center, Row};
+use super::runs::sort_runs;
 use super::step::Step;
 use crate::{Mass, State, System};
 
@@ -103,11 +104,20 @@ struct Depths {
 struct Before<'a>(Vec<Earlier<'a>>);
 
 /// A contact at the beginning of the step.
+#[derive(Clone, Copy)]
 struct Earlier<'a> {
     found: &'a Found<'a>,
     row: &'a Row,
     /// Its point in the frame of *a*.
     point: DVec3,
+}
+
+impl Pair {
+    /// The velocity of *a* relative to *b* at a point, as far as these are kinematic, m/s.
+    fn carrying(&self, point: DVec3) -> DVec3 {
+        let at = |motion: &BodyMotion| if motion.is_kinematic { motion.at(point) } else { DVec3::ZERO };
+        at(&self.motions[0]) - at(&self.motions[1])
+    }
 }
 
 impl<'a> Gaps<'a> {
@@ -126,59 +136,56 @@ impl<'a> Gaps<'a> {
         reach: Reach<'_>,
         time: f64,
     ) -> (Vec<Found<'c>>, Vec<Row>, Far) {
+        let (mut near, mut far) = (Vec::with_capacity(contacts.len()), Far::default());
+        let mut pairs: Vec<((InstanceId, InstanceId), Option<Pair>)> = Vec::new();
+        for contact in contacts {
+            // The contacts of a pair come together.
+            if pairs.last().is_none_or(|(last, _)| *last != ids(contact)) {
+                pairs.push((ids(contact), self.pair(ids(contact), poses, reach)));
+            }
+            let Some((_, Some(pair))) = pairs.last() else { continue };
+            let Pair { centers, skin, motions, reach, .. } = pair;
+            let (normal, point) = (contact.normal, contact.point_a);
+            let relative = motions[0].at(point) - motions[1].at(point);
+            let gap = contact.distance - skin;
+            if gap + time * relative.dot(normal) > *reach {
+                far.push(gap + time * pair.carrying(point).dot(normal), normal, point, centers);
+            } else {
+                near.push((contact, pairs.len() - 1, relative));
+            }
+        }
         let normals = match self.mode {
-            Mode::Node => Some(normals(contacts)),
+            Mode::Node => Some(normals(near.iter().map(|(contact, ..)| *contact))),
             // Those of the detection are in the normal cones.
             Mode::Face | Mode::Exact => None,
         };
         // Others follow the rows of contacts.
-        let mut rows = Vec::with_capacity(contacts.len() + OTHERS);
-        let (mut found, mut far) = (Vec::with_capacity(contacts.len()), Far::default());
-        let mut last: Option<(InstanceId, InstanceId, Pair)> = None;
-        for (k, contact) in contacts.iter().enumerate() {
+        let mut rows = Vec::with_capacity(near.len() + OTHERS);
+        let mut found = Vec::with_capacity(near.len());
+        for (k, (contact, pair, relative)) in near.into_iter().enumerate() {
             let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);
-            let (a, b) = (contact.instance_a, contact.instance_b);
-            // The contacts of a pair come together.
-            let pair = match &last {
-                Some((c, d, pair)) if (*c, *d) == (a, b) => pair,
-                _ => {
-                    let Some(pair) = self.pair(a, b, poses, reach) else { continue };
-                    &last.insert((a, b, pair)).2
-                }
-            };
-            let Pair { centers, friction, skin, motions, reach } = pair;
-            if *centers == [None; 2] {
-                continue;
-            }
-            let at = |motion: &BodyMotion| motion.at(contact.point_a);
-            let of_kinematic =
-                |motion: &BodyMotion| if motion.is_kinematic { at(motion) } else { DVec3::ZERO };
-            let relative = at(&motions[0]) - at(&motions[1]);
-            let carrying = of_kinematic(&motions[0]) - of_kinematic(&motions[1]);
-            let gap = contact.distance - skin;
-            if gap + time * relative.dot(normal) > *reach {
-                far.push(gap + time * carrying.dot(normal), normal, contact.point_a, centers);
-                continue;
-            }
-            let Some(mut row) = Row::of_contact(contact, normal, centers, *friction, self.options.stiffness)
+            let Some(pair) = &pairs[pair].1 else { continue };
+            let stiffness = self.options.stiffness;
+            let Some(mut row) = Row::of_contact(contact, normal, &pair.centers, pair.friction, stiffness)
             else {
                 continue;
             };
-            let carried = self.step.h * carrying;
+            let carried = self.step.h * pair.carrying(contact.point_a);
             if let Some(friction) = &mut row.friction {
                 friction.way = carried.reject_from_normalized(normal);
             }
-            row.gap -= skin;
+            row.gap -= pair.skin;
             let slip = relative.reject_from_normalized(normal);
             let (carried, way) = (carried.dot(normal), self.step.h * slip.length());
             rows.push(row);
-            found.push(Found { contact, normal, carried, skin: *skin, way });
+            found.push(Found { contact, normal, carried, skin: pair.skin, way });
         }
         (found, rows, far)
     }
 
-    /// What contacts of these instances, found at `poses`, have in common.
-    fn pair(&self, a: InstanceId, b: InstanceId, poses: &[Pose], reach: Reach<'_>) -> Option<Pair> {
+    /// What contacts of these instances, found at `poses`, have in common. `None` where neither is of
+    /// a free body.
+    fn pair(&self, (a, b): (InstanceId, InstanceId), poses: &[Pose], reach: Reach<'_>) -> Option<Pair> {
         let bodies = [self.system.body_of(a)?, self.system.body_of(b)?];
         let center = |body: usize| match self.system.bodies()[body].mass {
             Mass::Free(mass) => {
@@ -187,7 +194,7 @@ impl<'a> Gaps<'a> {
             Mass::Fixed | Mass::Kinematic => None,
         };
         let centers = bodies.map(center);
-        Some(Pair {
+        (centers != [None; 2]).then(|| Pair {
             reach: reach.between(&centers),
             centers,
             friction: self.system.friction(bodies[0], bodies[1]),
@@ -297,9 +304,9 @@ impl<'a> Gaps<'a> {
             let point = self.point_of_a(found.contact, &self.step.poses)?;
             Some(Earlier { found, row, point })
         };
-        let mut before: Vec<_> = found.iter().zip(rows).filter_map(earlier).collect();
-        before.sort_by_key(|earlier| feature(earlier.found.contact));
-        Before(before)
+        let before = found.iter().zip(rows).filter_map(earlier).collect();
+        let pair = |earlier: &Earlier<'_>| ids(earlier.found.contact);
+        Before(sort_runs(before, pair, |earlier| earlier.found.contact.feature.a))
     }
 
     /// The point of *a* of a contact that was found at `poses`, in the frame of *a*.
@@ -313,10 +320,16 @@ impl<'a> Gaps<'a> {
             let depth = self.skin(a?, b?) - c.distance;
             (depth > 0.0).then_some((feature(c), depth))
         };
-        let mut depths: Vec<_> = contacts.iter().filter_map(depth).collect();
-        // The deepest contact of each key comes first, because a face may touch in several cells.
-        depths.sort_by(|(k, d), (l, e)| k.cmp(l).then(e.total_cmp(d)));
-        depths.dedup_by_key(|(key, _)| *key);
+        let depths: Vec<_> = contacts.iter().filter_map(depth).collect();
+        let mut depths = sort_runs(depths, |((a, b, _), _)| (*a, *b), |((.., feature), _)| *feature);
+        // A face may touch in several cells; the deepest contact counts.
+        depths.dedup_by(|(k, d), (l, e)| {
+            let same = k == l;
+            if same {
+                *e = e.max(*d);
+            }
+            same
+        });
         let mut pairs = BTreeMap::new();
         for &((a, b, _), depth) in &depths {
             let of_pair = pairs.entry((a.min(b), a.max(b))).or_insert(depth);
@@ -363,6 +376,11 @@ impl Depths {
         let of_pair = self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0);
         of_feature.max(of_pair.min(*skin))
     }
+}
+
+/// The instances of a contact.
+fn ids(contact: &Contact) -> (InstanceId, InstanceId) {
+    (contact.instance_a, contact.instance_b)
 }
 
 /// The face or vertex of a contact.

@@ -3,14 +3,12 @@
 //!
 //! All rows of a pair of bodies act on the motion of one body relative to the other, so they are
 //! summed up for it, and the sum is passed on to the two bodies.
-use std::array;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::DVec3;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use super::integrate::pack;
 use super::lanes::{Lanes, WIDTH};
 use super::linear::Pattern;
 use super::relative::Relative;
@@ -102,6 +100,27 @@ pub struct Forces {
     pub friction: [Lanes; 2],
 }
 
+/// The derivatives of rows by the velocities of the two bodies of a group.
+type Sides = [[Lanes; 6]; 2];
+
+/// The bodies of a group.
+struct Pair<'a> {
+    /// That whose velocity counts, and the other one.
+    inverse: [Option<&'a Inverse>; 2],
+    time_step: f64,
+}
+
+/// A row of a batch.
+#[derive(Clone, Copy)]
+struct Member {
+    group: usize,
+    /// Whether it has friction.
+    slips: bool,
+    number: usize,
+    /// The side whose velocity counts.
+    reference: usize,
+}
+
 /// Bundles of one group, all with friction or all without.
 #[derive(Clone, Debug)]
 pub struct Batch {
@@ -136,18 +155,48 @@ impl Inverse {
         let turned = self.inertia * Vector3::new(d, e, f);
         Vector6::new(self.mass * a, self.mass * b, self.mass * c, turned.x, turned.y, turned.z)
     }
+
+    /// `J M⁻¹ Jᵀ`
+    #[inline]
+    fn weight(&self, [a, b, c, d, e, f]: &[Lanes; 6]) -> Lanes {
+        let turned = |i: usize| {
+            let row = |j: usize| self.inertia[(i, j)];
+            *d * row(0) + *e * row(1) + *f * row(2)
+        };
+        let along = *a * (*a * self.mass) + *b * (*b * self.mass) + *c * (*c * self.mass);
+        along + (*d * turned(0) + *e * turned(1) + *f * turned(2))
+    }
 }
 
-impl Bodies {
-    /// `1 / (h √w)`
-    fn scale(&self, weight: f64) -> f64 {
-        1.0 / (self.time_step * weight.sqrt())
+impl Pair<'_> {
+    /// `w`
+    #[inline]
+    fn weight(&self, sides: &Sides) -> Lanes {
+        let of_side = |(inverse, j): (&Option<&Inverse>, _)| inverse.map(|inverse| inverse.weight(j));
+        self.inverse.iter().zip(sides).filter_map(of_side).fold(Lanes::ZERO, |sum, weight| sum + weight)
     }
 
-    /// `w`
-    fn weight(&self, sides: &[Option<(usize, Vector6<f64>)>; 2]) -> f64 {
-        sides.iter().flatten().map(|(body, j)| dot6(j, &self.inverse[*body].times(j))).sum()
+    /// `1 / (h √w)` of `count` rows, and 1 for missing ones.
+    #[inline]
+    fn scale(&self, weight: Lanes, count: usize) -> Lanes {
+        let mut scale = Lanes::splat(1.0) / (weight.sqrt() * self.time_step);
+        scale.0[count..].fill(1.0);
+        scale
     }
+
+    /// The derivatives by the velocity that counts, in units with this scale.
+    #[inline]
+    fn scaled(&self, j: [Lanes; 6], scale: Lanes) -> [Lanes; 6] {
+        let factor = scale * self.time_step;
+        j.map(|j| factor * j)
+    }
+}
+
+/// The derivatives of ways along `t` at an arm from the centre of mass.
+#[inline]
+fn signed(sign: &Lanes, t: &[Lanes; 3], arm: &[Lanes; 3]) -> [Lanes; 6] {
+    let cross = |i: usize, j: usize| arm[i] * t[j] - t[i] * arm[j];
+    [t[0], t[1], t[2], cross(1, 2), cross(2, 0), cross(0, 1)].map(|j| *sign * j)
 }
 
 impl Placed<'_> {
@@ -158,11 +207,6 @@ impl Placed<'_> {
             _ => 0.0,
         };
         self.gap + time_step * self.row.sides.iter().zip(&self.bodies).map(rate).sum::<f64>()
-    }
-
-    /// The derivatives by the velocities of the bodies of the island.
-    fn sides(&self) -> [Option<(usize, Vector6<f64>)>; 2] {
-        array::from_fn(|k| Some((self.bodies[k]?, self.row.sides[k]?.1)))
     }
 
     /// The side whose velocity, relative to the other one, counts: that of the smaller body, near
@@ -177,30 +221,24 @@ impl Placed<'_> {
 }
 
 impl Lines {
-    /// Adds rows, each with its number.
-    pub fn add<'a>(
-        &mut self,
-        rows: impl Iterator<Item = (usize, Placed<'a>)>,
-        bodies: &Bodies,
-        pattern: &Pattern,
-    ) {
-        let mut placed: Vec<_> = rows
-            .map(|(k, row)| {
-                let reference = row.reference(bodies);
-                (self.group(&row, reference, bodies, pattern), row.row.friction.is_some(), k, row, reference)
-            })
-            .collect();
-        placed.sort_by_key(|&(group, slips, ..)| (group, slips));
-        for batch in placed.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            let first = self.bundles.len();
-            for four in batch.chunks(WIDTH) {
-                let mut bundle = Bundle::new(batch[0].1);
-                for &(.., k, row, reference) in four {
-                    bundle.push(k, &row, reference, bodies);
-                }
-                self.bundles.push(bundle);
-            }
-            let (group, slips, ..) = batch[0];
+    /// Adds those of `rows` with these numbers.
+    pub fn add(&mut self, numbers: &[usize], rows: &[Placed<'_>], bodies: &Bodies, pattern: &Pattern) {
+        let mut members = Vec::with_capacity(numbers.len());
+        for &number in numbers {
+            let row = &rows[number];
+            let reference = row.reference(bodies);
+            let group = self.group(row, reference, bodies, pattern);
+            members.push(Member { group, slips: row.row.friction.is_some(), number, reference });
+        }
+        members.sort_by_key(|member| (member.group, member.slips));
+        self.bundles.reserve(members.len() / WIDTH + self.groups.len());
+        for batch in members.chunk_by(|a, b| (a.group, a.slips) == (b.group, b.slips)) {
+            let (first, Member { group, slips, .. }) = (self.bundles.len(), batch[0]);
+            let Relative { body, other, .. } = &self.groups[group];
+            let inverse = [Some(*body), other.map(|other| other.body)];
+            let inverse = inverse.map(|body| body.map(|body| &bodies.inverse[body]));
+            let pair = Pair { inverse, time_step: bodies.time_step };
+            self.bundles.extend(batch.chunks(WIDTH).map(|four| Bundle::new(four, rows, &pair)));
             self.batches.push(Batch { group, slips, bundles: first..self.bundles.len() });
         }
     }
@@ -253,62 +291,72 @@ fn tangents(normal: DVec3) -> [DVec3; 2] {
 }
 
 impl Bundle {
-    fn new(slips: bool) -> Self {
-        let none = [Lanes::ZERO; 6];
-        let one = Lanes::splat(1.0);
-        let slip = slips.then_some(Slips {
-            tangents: [none; 2],
-            way: [Lanes::ZERO; 2],
-            coefficient: Lanes::ZERO,
-            scale: one,
+    /// One to four members of a batch, whose group has the bodies of `pair`.
+    fn new(members: &[Member], rows: &[Placed<'_>], pair: &Pair<'_>) -> Self {
+        let of = |member: &Member| (rows[member.number].row, [member.reference, 1 - member.reference]);
+        let mut along = Sides::default();
+        for (lane, member) in members.iter().enumerate() {
+            let (row, sides) = of(member);
+            for (to, side) in along.iter_mut().zip(sides) {
+                if let Some((_, j)) = &row.sides[side] {
+                    to.iter_mut().zip(&j.data.0[0]).for_each(|(to, j)| to.0[lane] = *j);
+                }
+            }
+        }
+        let count = members.len();
+        let scale = pair.scale(pair.weight(&along), count);
+        let (mut numbers, mut gap, mut compliance) = ([0; WIDTH], Lanes::ZERO, Lanes::splat(1.0));
+        let mut bounds = [f64::NEG_INFINITY, f64::INFINITY].map(Lanes::splat);
+        for (lane, member) in members.iter().enumerate() {
+            let (placed, scale) = (&rows[member.number], scale.0[lane]);
+            numbers[lane] = member.number;
+            gap.0[lane] = scale * placed.gap;
+            compliance.0[lane] = match (placed.resistance, placed.row.stiffness) {
+                (Resistance::Rigid, _) => RIGID,
+                (_, Stiffness::Absolute(stiffness)) => scale * scale / stiffness,
+                (_, Stiffness::Relative(stiffness)) => 1.0 / stiffness,
+            };
+            bounds.iter_mut().zip(placed.row.bounds).for_each(|(to, bound)| to.0[lane] = bound / scale);
+        }
+        let slip = members[0].slips.then(|| {
+            let (mut directions, mut arms, mut signs) =
+                ([[Lanes::ZERO; 3]; 2], [[Lanes::ZERO; 3]; 2], [Lanes::ZERO; 2]);
+            let (mut ways, mut coefficient) = ([Lanes::ZERO; 2], Lanes::ZERO);
+            let set = |to: &mut [Lanes; 3], lane: usize, vector: DVec3| {
+                to.iter_mut().zip(vector.to_array()).for_each(|(to, value)| to.0[lane] = value);
+            };
+            for (lane, member) in members.iter().enumerate() {
+                let (row, sides) = of(member);
+                let Some(friction) = &row.friction else { continue };
+                for ((direction, way), tangent) in
+                    directions.iter_mut().zip(&mut ways).zip(tangents(friction.normal))
+                {
+                    set(direction, lane, tangent);
+                    way.0[lane] = tangent.dot(friction.way);
+                }
+                for ((arm, sign), side) in arms.iter_mut().zip(&mut signs).zip(sides) {
+                    set(arm, lane, row.arms[side]);
+                    sign.0[lane] = if side == 0 { 1.0 } else { -1.0 };
+                }
+                coefficient.0[lane] = friction.coefficient;
+            }
+            let along = directions.map(|t| [0, 1].map(|k| signed(&signs[k], &t, &arms[k])));
+            let weight = pair.weight(&along[0]) + pair.weight(&along[1]);
+            let of_slip = pair.scale(weight * 0.5, count);
+            Slips {
+                tangents: along.map(|[j, _]| pair.scaled(j, of_slip)),
+                way: ways.map(|way| of_slip * way),
+                coefficient: coefficient * scale / of_slip,
+                scale: of_slip,
+            }
         });
-        let bounds = [Lanes::splat(f64::NEG_INFINITY), Lanes::splat(f64::INFINITY)];
-        let (gap, compliance) = (Lanes::ZERO, one);
-        Self { rows: [0; WIDTH], count: 0, normal: none, gap, compliance, bounds, scale: one, slip }
+        let normal = pair.scaled(along[0], scale);
+        Self { rows: numbers, count, normal, gap, compliance, bounds, scale, slip }
     }
 
     /// The numbers of its rows.
     pub fn rows(&self) -> &[usize] {
         &self.rows[..self.count]
-    }
-
-    /// Adds a row to less than four.
-    fn push(&mut self, number: usize, placed: &Placed<'_>, reference: usize, bodies: &Bodies) {
-        let (lane, row, h) = (self.count, placed.row, bodies.time_step);
-        self.rows[lane] = number;
-        self.count += 1;
-        let set = |to: &mut [Lanes; 6], j: Option<(usize, Vector6<f64>)>, scale: f64| {
-            if let Some((_, j)) = j {
-                to.iter_mut().zip(&j.data.0[0]).for_each(|(to, j)| to.0[lane] = h * scale * j);
-            }
-        };
-        let sides = placed.sides();
-        let scale = bodies.scale(bodies.weight(&sides));
-        set(&mut self.normal, sides[reference], scale);
-        self.gap.0[lane] = scale * placed.gap;
-        self.compliance.0[lane] = match placed.resistance {
-            Resistance::Rigid => RIGID,
-            Resistance::Spring | Resistance::Parting => match row.stiffness {
-                Stiffness::Absolute(stiffness) => scale * scale / stiffness,
-                Stiffness::Relative(stiffness) => 1.0 / stiffness,
-            },
-        };
-        self.bounds.iter_mut().zip(row.bounds).for_each(|(to, bound)| to.0[lane] = bound / scale);
-        self.scale.0[lane] = scale;
-        if let (Some(slip), Some(friction)) = (&mut self.slip, &row.friction) {
-            let directions = tangents(friction.normal);
-            let along = directions.map(|t| {
-                let side =
-                    |k: usize, sign: f64| Some((placed.bodies[k]?, sign * pack(t, row.arms[k].cross(t))));
-                [side(0, 1.0), side(1, -1.0)]
-            });
-            let of_slip = bodies.scale(along.iter().map(|sides| bodies.weight(sides)).sum::<f64>() / 2.0);
-            slip.tangents.iter_mut().zip(along).for_each(|(to, side)| set(to, side[reference], of_slip));
-            let way = directions.map(|t| of_slip * t.dot(friction.way));
-            slip.way.iter_mut().zip(way).for_each(|(to, way)| to.0[lane] = way);
-            slip.coefficient.0[lane] = friction.coefficient * scale / of_slip;
-            slip.scale.0[lane] = of_slip;
-        }
     }
 
     /// For each bound: whether a row has it.

@@ -10,10 +10,10 @@ const PARALLEL: f64 = 1e-3;
 ///
 /// Where the edges of two faces on each other are nearly flush, the nearest point of *b* is on its
 /// edge, to the side by less than the distance. Such a contact would push the bodies sideways.
-pub fn normals(contacts: &[Contact]) -> Vec<DVec3> {
+pub fn normals<'a>(contacts: impl Iterator<Item = &'a Contact> + Clone) -> Vec<DVec3> {
     let is_face = |c: &&Contact| matches!(c.feature.b, FeatureB::Face(_));
-    let mut faces: Vec<_> = contacts.iter().filter(is_face).map(normal_of_pair).collect();
-    faces.sort_by(|(p, n), (q, m)| p.cmp(q).then(n.x.total_cmp(&m.x)));
+    let mut faces: Vec<_> = contacts.clone().filter(is_face).map(normal_of_pair).collect();
+    faces.sort_unstable_by(|(p, n), (q, m)| p.cmp(q).then(n.x.total_cmp(&m.x)));
     faces.dedup();
     let of_contact = |contact: &Contact| {
         if is_face(&contact) {
@@ -26,7 +26,7 @@ pub fn normals(contacts: &[Contact]) -> Vec<DVec3> {
         let sign = if contact.instance_a < contact.instance_b { 1.0 } else { -1.0 };
         nearest.filter(|(d, _)| *d <= PARALLEL).map_or(contact.normal, |(_, n)| sign * *n)
     };
-    contacts.iter().map(of_contact).collect()
+    contacts.map(of_contact).collect()
 }
 
 /// The instances of a contact, the lower one first, and the normal from the higher one to the lower
@@ -70,6 +70,6 @@ mod tests {
             ([1, 0], edge, near, near),
         ];
         let contacts = cases.map(|(ids, b, normal, _)| contact(ids, b, normal));
-        assert_eq!(normals(&contacts), cases.map(|(.., expected)| expected));
+        assert_eq!(normals(contacts.iter()), cases.map(|(.., expected)| expected));
     }
 }

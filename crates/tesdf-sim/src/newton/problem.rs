@@ -104,7 +104,7 @@ impl<'a> Problem<'a> {
         let mut guess = guess.map(|_| start);
         let mut iterations = 0;
         loop {
-            lines.add(added.iter().map(|&k| (k, self.rows[k])), &self.bodies, &self.pattern);
+            lines.add(&added, &self.rows, &self.bodies, &self.pattern);
             let interior = Interior { bodies: &self.bodies, pattern: &self.pattern, lines: &lines };
             let guessed = guess.map(|velocity| (velocity, lines.forces(|k| (self.rows[k].row, forces[k]))));
             let found = interior.solve(guessed);

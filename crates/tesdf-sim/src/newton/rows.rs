@@ -4,6 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 use tesdf::collide::{Contact, InstanceId, Pose};
 
 use super::integrate::pack;
+use super::runs::sort_runs;
 use crate::{MassProperties, System};
 
 /// A free body and its inertia, in the middle of its free rotation in a step.
@@ -205,9 +206,11 @@ pub struct Bodies<'a> {
 /// come.
 pub fn carry(before: impl Iterator<Item = RowId>, forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
     fn ordered(ids: impl Iterator<Item = RowId>) -> Vec<(RowId, usize)> {
-        let mut order: Vec<_> = ids.zip(0..).collect();
-        order.sort_unstable();
-        order
+        let pair = |(id, _): &(RowId, usize)| match id {
+            RowId::Contact(pair, _) => Ok(*pair),
+            RowId::Joint(_) => Err(()),
+        };
+        sort_runs(ids.zip(0..).collect(), pair, |(id, _)| *id)
     }
     let mut carried = vec![RowForce::default(); rows.len()];
     let before = ordered(before);

@@ -206,8 +206,8 @@ impl Newton {
             self.find_kept(&new, whole)?;
             report.detection += start.elapsed();
         }
-        self.sleep.kept.clone_from(&still);
-        self.mark(&still);
+        self.sleep.kept = still;
+        self.mark_still();
         Ok(report)
     }
 
@@ -244,8 +244,14 @@ impl Newton {
         found.hidden.iter().for_each(|h| keep(h.instance_a, h.instance_b, None, Some(*h)));
     }
 
+    /// Marks those that are still in the step, and no others.
+    pub(super) fn mark_still(&mut self) {
+        let still = self.sleep.still.clone();
+        self.mark(&still);
+    }
+
     /// Marks bodies as still in the scene.
-    fn mark(&mut self, still: &[bool]) {
+    pub(super) fn mark(&mut self, still: &[bool]) {
         let ids = self.system.bodies().iter().zip(still).filter(|(_, still)| **still);
         let ids: Vec<_> = ids.map(|(body, _)| body.instance).collect();
         self.system.set_still(ids);
@@ -268,8 +274,7 @@ impl Newton {
             return false;
         }
         sleep.wake(touched, system);
-        let still = sleep.still.clone();
-        self.mark(&still);
+        self.mark_still();
         true
     }
 
@@ -416,7 +421,7 @@ fn joined(system: &System) -> impl Iterator<Item = [usize; 2]> {
 }
 
 /// The pairs of bodies of contacts.
-fn pairs_of(contacts: &[Contact], system: &System) -> impl Iterator<Item = [usize; 2]> {
+pub fn pairs_of(contacts: &[Contact], system: &System) -> impl Iterator<Item = [usize; 2]> {
     // The contacts of a pair of instances follow each other.
     let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
     let pairs = contacts.chunk_by(move |x, y| ids(x) == ids(y));

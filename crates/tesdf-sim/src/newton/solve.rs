@@ -10,6 +10,7 @@ use super::line::Placed;
 use super::problem::{Minimum, Problem};
 use super::rows::{Resistance, Row, RowForce, carry};
 use super::step::Step;
+use crate::Residual;
 
 /// Bodies are wild when they are faster than what moves them by this factor.
 const WILD: f64 = 10.0;
@@ -25,6 +26,27 @@ pub struct Guess<'a> {
     pub velocities: &'a [Vector6<f64>],
     /// What each row does; `None` where nothing is known.
     pub forces: Option<&'a [RowForce]>,
+}
+
+impl Guess<'_> {
+    /// The guess for an island, where it is known to be the solution: its bodies rest, and its rows are
+    /// as before.
+    fn solved(&self, step: &Step, island: &Island, rows: &[Row], gap: Gap) -> Option<Minimum> {
+        let mut of_island = island.rows.iter().map(|&k| &rows[k]);
+        let is_solved = match gap {
+            Gap::Position => island.bodies.iter().all(|&k| step.resting[k]),
+            // The minimisation before was of the same problem.
+            Gap::Relaxed => of_island.all(|row| row.relaxed_gap == row.gap),
+        };
+        let forces = self.forces.filter(|_| is_solved)?;
+        Some(Minimum {
+            velocity: island.bodies.iter().map(|&k| self.velocities[k]).collect(),
+            forces: island.rows.iter().map(|&k| forces[k]).collect(),
+            iterations: 0,
+            converged: true,
+            residual: Residual::default(),
+        })
+    }
 }
 
 /// The two gaps of a row.
@@ -48,7 +70,10 @@ impl Newton {
         guess: Guess<'_>,
     ) -> (Vec<Vector6<f64>>, Vec<RowForce>) {
         let islands = islands(step.free.len(), rows);
-        let minimum = |island: &Island| self.solve_island(step, motion, island, rows, gap, guess);
+        let minimum = |island: &Island| match guess.solved(step, island, rows, gap) {
+            Some(solved) => solved,
+            None => self.solve_island(step, motion, island, rows, gap, guess),
+        };
         // One thread computes each minimum, and they are collected in order: the bits do not depend
         // on the number of threads.
         let minima: Vec<Minimum> = match islands.len() > 1 && rows.len() >= ON_ONE_THREAD {

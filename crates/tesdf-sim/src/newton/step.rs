@@ -6,7 +6,7 @@ use tesdf::collide::Pose;
 use super::geometric::Motion;
 use super::integrate::{pack, unpack};
 use super::rotation::Rotation;
-use super::rows::FreeBody;
+use super::rows::{FreeBody, Row};
 use crate::StepReport;
 
 /// Values that are constant during a step.
@@ -28,11 +28,24 @@ pub struct Step {
     /// For each free body: whether a body of its island penetrates too deeply for a linear
     /// prediction.
     pub deep: Vec<bool>,
+    /// For each free body: whether it rests in the step (`resting.rs`).
+    pub resting: Vec<bool>,
     /// What is reported of it.
     pub report: StepReport,
 }
 
 impl Step {
+    /// Whether a row has a body of an island that overlaps deeply.
+    pub fn is_deep(&self, row: &Row) -> bool {
+        row.sides.iter().flatten().any(|(k, _)| self.deep[*k])
+    }
+
+    /// Whether a contact stays as it was found at the beginning of the step. A deep body that is pushed
+    /// into another one must not kick it, and between bodies that rest nothing else would be found.
+    pub fn stays(&self, row: &Row) -> bool {
+        self.is_deep(row) || row.sides.iter().flatten().all(|(k, _)| self.resting[*k])
+    }
+
     /// Sets the targets so that the angular momenta that `velocities` have in the motion `plain`
     /// lead to the rotations of rigid bodies.
     ///

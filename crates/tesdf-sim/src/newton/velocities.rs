@@ -68,7 +68,8 @@ impl Newton {
             self.gaps(step).begin(&found, &mut first);
             first.extend_from_slice(&joints);
             step.deep = self.deep(step, all, &first);
-            for (row, found) in first.iter_mut().zip(&found).filter(|(row, _)| is_deep(row, &step.deep)) {
+            step.resting.fill(false);
+            for (row, found) in first.iter_mut().zip(&found).filter(|(row, _)| step.is_deep(row)) {
                 let parts = apart.contains(&pair(found.contact));
                 row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
             }
@@ -94,13 +95,10 @@ impl Newton {
         let of_contacts = &first[..found.len()];
         // Those of the last detection.
         let mut later: Option<Vec<Row>> = None;
-        // A deep body that is pushed into another one must not kick it, so what is detected again
-        // says nothing about deep bodies.
-        let deep = step.deep.clone();
-        let stays = |row: &Row| is_deep(row, &deep);
+        step.resting = self.resting(step, all, &first, &velocities);
         // The contacts at which bodies are hit, found where they are hit.
         let mut held: Vec<Row> = Vec::new();
-        if first.iter().any(|row| !stays(row)) {
+        if first.iter().any(|row| !step.stays(row)) {
             let beginning = self.gaps(step).beginning(contacts, &found, of_contacts);
             let mut hit = match self.options.redetections {
                 0 => None,
@@ -117,19 +115,22 @@ impl Newton {
                 let mut predicted = self.moved(step, &seen);
                 // The contacts of these bodies stay, so the detection need not look as far as they
                 // are pushed.
-                for (k, free) in step.free.iter().enumerate().filter(|(k, _)| deep[*k]) {
+                for (k, free) in step.free.iter().enumerate().filter(|(k, _)| step.deep[*k]) {
                     let seen = &mut predicted[free.body];
                     (seen.linear, seen.angular) = unpack(&step.target[k]);
                 }
                 // A step reports the overlaps at its beginning.
-                let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
+                self.mark_resting(step);
+                let contacts = self.detect(step, &predicted, HiddenSearch::Off);
+                self.mark_still();
+                let contacts = contacts?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 let rows_within = |step: &Step, reach: Reach<'_>, held: &[Row]| {
                     let contacts = contacts.as_slice();
                     let (mut next, far) =
                         self.gaps(step).predicted_rows(contacts, &poses, &seen, &beginning, &is_hit, reach);
-                    next.retain(|row| !stays(row));
-                    next.extend(of_contacts.iter().filter(|row| stays(row)).cloned());
+                    next.retain(|row| !step.stays(row));
+                    next.extend(of_contacts.iter().filter(|row| step.stays(row)).cloned());
                     next.extend_from_slice(held);
                     next.extend_from_slice(&joints);
                     let of_joints = next.len() - joints.len()..;
@@ -142,7 +143,7 @@ impl Newton {
                     let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
                     let (_, forces) =
                         self.solve(step, motion, &next, Gap::Position, from_last(&velocities, &guess));
-                    held = hit.held(&next, &forces, stays);
+                    held = hit.held(&next, &forces, |row| step.stays(row));
                     continue;
                 }
                 step.turn(&mut plain, &velocities);
@@ -165,6 +166,11 @@ impl Newton {
                     }
                     (step.report.converged, step.report.residual) = (converged, residual);
                     reach = Reach::All;
+                }
+                if self.stirs(step, &velocities) {
+                    step.resting.fill(false);
+                    round -= 1;
+                    continue;
                 }
                 if self.ways(step, &before, &velocities).fold(0.0, f64::max) < self.options.settled {
                     break;
@@ -191,7 +197,7 @@ impl Newton {
 
     /// For each free body a bound of the way between the points that these velocities move in a step,
     /// m.
-    fn ways<'a>(
+    pub(super) fn ways<'a>(
         &'a self,
         step: &'a Step,
         from: &'a [Vector6<f64>],
@@ -242,9 +248,4 @@ impl Newton {
         }
         deep
     }
-}
-
-/// Whether a row has one of the `deep` bodies.
-fn is_deep(row: &Row, deep: &[bool]) -> bool {
-    row.sides.iter().flatten().any(|(k, _)| deep[*k])
 }

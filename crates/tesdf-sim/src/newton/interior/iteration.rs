@@ -222,9 +222,9 @@ impl<'a> Iterate<'a> {
             iterations: 0,
             bounds,
             least,
-            locals: vec![Local::default(); count],
-            standing: vec![Standing::default(); count],
-            aims: vec![[Lanes::ZERO; 2]; count],
+            locals: Vec::with_capacity(count),
+            standing: Vec::with_capacity(count),
+            aims: Vec::with_capacity(count),
         }
     }
 
@@ -287,6 +287,10 @@ impl<'a> Iterate<'a> {
         };
         let mut momentum = self.of.lack(&self.velocity);
         let mut brought = vec![Vector6::zeros(); momentum.len()];
+        // Batches have all bundles in their order.
+        self.locals.clear();
+        self.standing.clear();
+        self.aims.clear();
         for batch in &lines.batches {
             let group = &lines.groups[batch.group];
             let relative = group.of(&self.velocity);
@@ -309,7 +313,9 @@ impl<'a> Iterate<'a> {
                     _ => [Lanes::ZERO; 2],
                 };
                 sum.add(bundle, local.stiffness, follows, local.slip.stiffness);
-                (self.locals[k], self.standing[k], self.aims[k]) = (local, standing, away);
+                self.locals.push(local);
+                self.standing.push(standing);
+                self.aims.push(away);
             }
             group.act(acting.map(Lanes::sum), &mut momentum);
             group.act(change.map(Lanes::sum), &mut brought);
@@ -350,7 +356,8 @@ impl<'a> Iterate<'a> {
     fn follow(&self, factor: &Factor<'_>, brought: &[Vector6<f64>], is_coulomb: bool, to: &mut Direction) {
         let lines = self.of.lines;
         to.velocity = factor.solve(brought);
-        to.rows.resize(lines.bundles.len(), Change::default());
+        to.rows.clear();
+        to.rows.reserve(lines.bundles.len());
         let mut longest = Lanes::splat(f64::INFINITY);
         for batch in &lines.batches {
             let relative = lines.groups[batch.group].of(&to.velocity);
@@ -384,7 +391,7 @@ impl<'a> Iterate<'a> {
                 ] {
                     longest = longest.zip(to_zero(value, change), |a, b| if b < a { b } else { a });
                 }
-                to.rows[k] = Change { force, slack, friction };
+                to.rows.push(Change { force, slack, friction });
             }
         }
         to.longest = longest.least();
