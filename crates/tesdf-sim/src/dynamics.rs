@@ -119,7 +119,29 @@ impl Residual {
     }
 }
 
+/// How well solves came out.
+#[derive(Clone, Copy)]
+pub(crate) struct Verdict {
+    converged: bool,
+    residual: Residual,
+}
+
+impl Verdict {
+    /// Before the first solve.
+    pub(crate) const GOOD: Self = Self { converged: true, residual: Residual { way: 0.0, force: 0.0 } };
+}
+
 impl StepReport {
+    /// How well the solves so far came out.
+    pub(crate) fn verdict(&self) -> Verdict {
+        Verdict { converged: self.converged, residual: self.residual }
+    }
+
+    /// Takes back what was said of solves since this verdict: they are of no account.
+    pub(crate) fn take_back(&mut self, to: Verdict) {
+        (self.converged, self.residual) = (to.converged, to.residual);
+    }
+
     /// Adds what a later part of the same step did.
     pub(crate) fn add(&mut self, later: &Self) {
         self.detections += later.detections;

@@ -18,7 +18,8 @@ use super::rotation::Rotation;
 use super::rows::FreeBody;
 use super::sleep::Sleep;
 use super::step::Step;
-use crate::{Dynamics, DynamicsError, Mass, Motor, Residual, State, StepReport, System, Wrench};
+use crate::dynamics::Verdict;
+use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
 /// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
 /// signature implement this trait.
@@ -340,7 +341,7 @@ impl Newton {
                 return Ok(None);
             }
             // What an earlier minimisation did not reach is of no account.
-            (step.report.converged, step.report.residual) = (true, Residual::default());
+            step.report.take_back(Verdict::GOOD);
             [velocities, carried] = self.velocities(&mut step, look.contacts.as_slice())?;
         }
         let mut states = self.moved(&step, &velocities);
@@ -364,7 +365,8 @@ impl Newton {
             (left, report.parts) = (0.0, 1);
         }
         while left > 0.0 {
-            let Some(Part { states, found, passing, is_loose, report: of_part }) = self.part(time, whole)?
+            let Some(Part { states, found, passing, is_loose, report: mut of_part }) =
+                self.part(time, whole)?
             else {
                 continue;
             };
@@ -372,10 +374,10 @@ impl Newton {
             let half = is_loose.then_some(Passing { hit: None, pairs: 0 });
             let divides = passing.filter(|_| may_divide).or(half);
             // A part that is divided is solved again.
-            report.add(&match divides {
-                Some(_) => StepReport { converged: true, residual: Residual::default(), ..of_part },
-                None => of_part,
-            });
+            if divides.is_some() {
+                of_part.take_back(Verdict::GOOD);
+            }
+            report.add(&of_part);
             touching = self.touching(found.as_slice());
             first.get_or_insert_with(|| self.with_kept(found));
             if let Some(Passing { hit, .. }) = divides {

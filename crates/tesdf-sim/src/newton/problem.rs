@@ -80,6 +80,12 @@ impl<'a> Problem<'a> {
         self
     }
 
+    /// How far these velocities close a contact beyond its gap, m.
+    pub fn closed(&self, velocity: &[Vector6<f64>]) -> f64 {
+        let contacts = self.rows.iter().filter(|placed| placed.row.is_contact());
+        contacts.map(|placed| -placed.at(velocity, self.bodies.time_step)).fold(0.0, f64::max)
+    }
+
     /// Solves from `start`, where rows had the forces `guess`, if any.
     ///
     /// Most contacts stay open, so it begins with those that are nearly closed. It is repeated with

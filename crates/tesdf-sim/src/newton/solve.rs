@@ -135,10 +135,13 @@ impl Newton {
         let asked = placed.iter().map(|placed| placed.gap.abs() / step.h).fold(0.0, f64::max);
         let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
         let minimum = problem.minimise(start.clone(), forces.as_deref());
-        match self.is_wild(step, island, asked, [&of(&motion.target), &start], &minimum.velocity) {
-            true => Minimum { converged: false, ..problem.softened().minimise(start, None) },
-            false => minimum,
+        if !self.is_wild(step, island, asked, [&of(&motion.target), &start], &minimum.velocity) {
+            return minimum;
         }
+        let soft = problem.softened();
+        let minimum = soft.minimise(start, None);
+        let way = minimum.residual.way.max(soft.closed(&minimum.velocity));
+        Minimum { converged: false, residual: Residual { way, ..minimum.residual }, ..minimum }
     }
 
     /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows

@@ -32,11 +32,11 @@ impl Newton {
         let ways: Vec<f64> = self.ways(step, &start, &step.target).collect();
         let mut reach = Reach::Near(&ways);
         loop {
-            let (converged, residual) = (step.report.converged, step.report.residual);
+            let verdict = step.report.verdict();
             if let Some(found) = self.velocities_within(step, contacts, &start, reach)? {
                 return Ok(found);
             }
-            (step.report.converged, step.report.residual) = (converged, residual);
+            step.report.take_back(verdict);
             reach = Reach::All;
         }
     }
@@ -73,7 +73,7 @@ impl Newton {
                 let parts = apart.contains(&pair(found.contact));
                 row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
             }
-            let (converged, residual) = (step.report.converged, step.report.residual);
+            let verdict = step.report.verdict();
             let kept = self.kept.of(&first);
             let of_kept =
                 kept.as_deref().and_then(|kept| plain.stiffened(&loads(&first, kept), &found_at, &from));
@@ -89,7 +89,7 @@ impl Newton {
             if !far.closes(&velocities, step.h) {
                 break (found, first, far, velocities, forces, stiffened);
             }
-            (step.report.converged, step.report.residual) = (converged, residual);
+            step.report.take_back(verdict);
             reach = Reach::All;
         };
         let of_contacts = &first[..found.len()];
@@ -152,7 +152,7 @@ impl Newton {
                 stiffened = plain.stiffened(&loads(last, &forces), &found_at, &from);
                 let motion = stiffened.as_ref().unwrap_or(&plain);
                 let before = velocities.clone();
-                let (converged, residual) = (step.report.converged, step.report.residual);
+                let verdict = step.report.verdict();
                 let mut reach = near;
                 loop {
                     let next;
@@ -164,7 +164,7 @@ impl Newton {
                     if !far.closes(&velocities, step.h) {
                         break;
                     }
-                    (step.report.converged, step.report.residual) = (converged, residual);
+                    step.report.take_back(verdict);
                     reach = Reach::All;
                 }
                 if self.stirs(step, &velocities) {
