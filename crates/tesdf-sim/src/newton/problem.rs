@@ -347,6 +347,9 @@ mod tests {
         assert!(found.converged);
         assert!(H * found.velocity[0].norm() < 1e-9, "{}", found.velocity[0]);
         assert!((found.forces[0].along / found.forces[1].along - 1.0).abs() < 1e-6);
+        // Each is closed by what it asks for.
+        let closed = problem(&free, &target, &rows).closed(&found.velocity);
+        assert!((closed - 1e-3).abs() < 1e-9, "{closed}");
     }
 
     #[test]
