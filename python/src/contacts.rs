@@ -2,7 +2,9 @@
 use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tesdf::collide::{CoarseContact, Contact, Contacts, FeatureB, HiddenOverlap, InstanceId, PairReduction};
+use tesdf::collide::{
+    CoarseContact, Contact, Contacts, FeatureB, HiddenOverlap, InstanceId, PairReduction, TouchingFeatures,
+};
 
 use crate::classes;
 use crate::errors::{argument, kind_of};
@@ -144,11 +146,7 @@ impl Table {
 
     fn push(&mut self, block: &[Contact]) {
         let of = || block.iter();
-        let feature_b = |c: &Contact| match c.feature.b {
-            FeatureB::Vertex(vertex) => (0, [vertex, NO_CELL]),
-            FeatureB::Edge(low, high) => (1, [low, high]),
-            FeatureB::Face(face) => (2, [face, NO_CELL]),
-        };
+        let feature_b = |c: &Contact| kind_and_ids(c.feature.b);
         self.point_a.extend(of().map(|c| c.point_a.to_array()));
         self.point_b.extend(of().map(|c| c.point_b.to_array()));
         self.normal.extend(of().map(|c| c.normal.to_array()));
@@ -163,6 +161,26 @@ impl Table {
         self.feature_b.extend(of().map(|c| feature_b(c).1));
         self.converged.extend(of().map(|c| c.converged));
     }
+}
+
+/// A feature as a number of its kind, and two ids of which an edge alone uses the second one.
+fn kind_and_ids(feature: FeatureB) -> (u8, [u32; 2]) {
+    match feature {
+        FeatureB::Vertex(vertex) => (0, [vertex, NO_CELL]),
+        FeatureB::Edge(low, high) => (1, [low, high]),
+        FeatureB::Face(face) => (2, [face, NO_CELL]),
+    }
+}
+
+/// An object of `tesdf.TouchingFeatures`.
+pub fn touching<'py>(py: Python<'py>, found: &[TouchingFeatures]) -> PyResult<Bound<'py, PyAny>> {
+    let (a, b) = (|| found.iter().map(|f| kind_and_ids(f.a)), || found.iter().map(|f| kind_and_ids(f.b)));
+    Columns::new(py)
+        .add("a_kind", a().map(|(kind, _)| kind))?
+        .add_rows("a", a().map(|(_, ids)| ids))?
+        .add("b_kind", b().map(|(kind, _)| kind))?
+        .add_rows("b", b().map(|(_, ids)| ids))?
+        .build("TouchingFeatures")
 }
 
 fn columns<'py>(py: Python<'py>, found: &[Contact]) -> PyResult<Columns<'py>> {

@@ -58,7 +58,7 @@ impl PatchTracker {
 }
 
 /// The contacts whose columns an object of `tesdf.Contacts` has.
-fn contacts_of(of: &Bound<'_, PyAny>) -> PyResult<Vec<Contact>> {
+pub fn contacts_of(of: &Bound<'_, PyAny>) -> PyResult<Vec<Contact>> {
     let vectors = |name| Column::<f64>::new(of, name);
     let ids = |name| Column::<u32>::new(of, name);
     let (point_a, point_b, normal) = (vectors("point_a")?, vectors("point_b")?, vectors("normal")?);

@@ -18,6 +18,7 @@ use crate::errors::{Error, argument};
 use crate::given::{Given, PerInstance};
 use crate::interrupt::cancellable;
 use crate::pairs::{self, Motions, pairs_of};
+use crate::patches::contacts_of;
 use crate::poses::{self, Count};
 use crate::{classes, pool, shapes};
 
@@ -302,7 +303,8 @@ impl Scene {
     /// Contacts that stay on a device, as DeviceContacts, for a physics engine on the same device.
     ///
     /// They are those of detect on this device, rounded to float32, sorted by world and instances;
-    /// within a pair, faces have the order of the asset. On a CUDA device other libraries use the
+    /// within a pair, faces have the order of the asset. Normals are gradients of the signed distance,
+    /// and contacts are reduced on the device. On a CUDA device other libraries use the
     /// arrays in place, and their poses are used in place. Only counters are copied to the processor,
     /// and contacts only to tell whether they show a deep overlap that was found otherwise.
     ///
@@ -353,6 +355,31 @@ impl Scene {
         let (scene, pool) = (self.now(), pool::of(threads).map_err(|e| e.raise(py))?);
         let found = py.detach(|| pool.install(|| coarse_contacts(&scene, &options)));
         contacts::coarse(py, &found.map_err(|e| Error::Collide(e).raise(py))?)
+    }
+
+    /// The vertices, edges or faces at the two points of each contact of a detection:
+    /// TouchingFeatures. The scene must have the poses of the detection. Where both orders of two
+    /// instances find the same two features, a and b are swapped in the other order.
+    ///
+    /// A point is at a vertex or an edge when it is nearer than 2e-6 of the diagonal of the larger
+    /// body, at most 1e-4 of that of the smaller one. Vertices and faces are numbered as in the mesh;
+    /// of a Box, faces are its sides 0 to 5 for -x +x -y +y -z +z, and vertices its nodes; a
+    /// Plane, Sphere or Capsule has the face 0.
+    ///
+    /// contacts: Contacts of Scene.detect, or the contacts of a Simulation with a scene of its
+    /// bodies.
+    ///
+    /// Raises CollideError if the scene lacks an instance or a face of a contact.
+    fn touching_features<'py>(
+        &self,
+        py: Python<'py>,
+        contacts: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let found = contacts_of(contacts)?;
+        let features = self.compute(py, |scene| {
+            found.iter().map(|c| c.touching_features(scene)).collect::<Result<Vec<_>, _>>()
+        })?;
+        contacts::touching(py, &features)
     }
 
     /// The signed distance between the surfaces of two instances, whatever their worlds, groups and

@@ -72,6 +72,7 @@ from .contacts import (
     Record,
     Reductions,
     StepContacts,
+    TouchingFeatures,
 )
 from .errors import (
     AssetError,
@@ -146,6 +147,7 @@ __all__ = [
     "SimulationError",
     "Sphere",
     "StepContacts",
+    "TouchingFeatures",
     "UsdMesh",
     "VerifyReport",
     "WhyReport",

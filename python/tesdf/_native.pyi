@@ -17,6 +17,7 @@ from .contacts import (
     Instances,
     Record,
     StepContacts,
+    TouchingFeatures,
 )
 from .reports import (
     Certificate,
@@ -262,6 +263,7 @@ class Scene:
         precision: _Precision = "f64",
         threads: int | None = None,
     ) -> CoarseContacts: ...
+    def touching_features(self, contacts: ContactRows) -> TouchingFeatures: ...
     def clearance(self, a: int, b: int, *, tolerance: float | None = None) -> Clearance: ...
     def clearances(self, pairs: npt.ArrayLike, *, tolerance: float | None = None) -> Clearances: ...
     def times_of_impact(

@@ -208,7 +208,8 @@ class ContactRows(_Rows):
     point_b: _Float
     """[N, 3] the point of b's surface that is closest to `point_a`"""
     normal: _Float
-    """[N, 3] unit gradient of b's signed distance at `point_a`; points from b to a"""
+    """[N, 3] unit vector from b to a: the gradient of b's signed distance at `point_a`, in the modes
+    "face" and "exact" turned to a direction that both bodies allow"""
     distance: _Float
     """[N] signed distance of b at `point_a`; negative where the bodies overlap"""
     face_a: _Id
@@ -228,7 +229,8 @@ class ContactRows(_Rows):
     """[N] the closest feature of b: 0 for a vertex, 1 for an edge, 2 for a face"""
     feature_b: _Id
     """[N, 2] the vertex or face in the first column, or the two vertices of the edge, the lower id
-    first; the unused number is 2^32 - 1"""
+    first; the unused number is 2^32 - 1. `Scene.touching_features` also names the vertex or edge of
+    a"""
     converged: npt.NDArray[np.bool_]
     """[N] whether it is proved that no point of the face is deeper by more than the tolerance"""
 
@@ -254,6 +256,22 @@ class Contacts(ContactRows):
     def __repr__(self) -> str:
         overlaps = f", {len(self.hidden)} hidden overlaps" if len(self.hidden) else ""
         return f"<tesdf.Contacts: {len(self)} contacts{overlaps}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TouchingFeatures(_Rows):
+    """The vertices, edges or faces of two bodies that touch, a row for each contact:
+    `Scene.touching_features`."""
+
+    a_kind: npt.NDArray[np.uint8]
+    """[N] 0 for a vertex, 1 for an edge, 2 for a face of a"""
+    a: _Id
+    """[N, 2] the vertex or face in the first column, or the two vertices of the edge, the lower id
+    first; the unused number is 2^32 - 1"""
+    b_kind: npt.NDArray[np.uint8]
+    """[N] likewise of b"""
+    b: _Id
+    """[N, 2] likewise of b"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

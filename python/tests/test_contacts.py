@@ -61,7 +61,7 @@ OPTIONS = [
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
-def test_contacts_are_those_of_the_command(asset, file, options):
+def test_contacts_are_those_of_the_command(asset, file, linked, options):
     found = tesdf.collide(asset, asset, pose_b=LINKED, **options)
     flags = [text for name, value in options.items() for text in ("--" + name.replace("_", "-"), str(value))]
     expected = command("collide", file, "--report", *flags)
@@ -74,6 +74,11 @@ def test_contacts_are_those_of_the_command(asset, file, options):
     for kind, ids, contact in zip(found.feature_b_kind, found.feature_b.tolist(), contacts):
         [(name, of_b)] = contact["feature"]["b"].items()
         assert kind == KINDS[name] and ids == (of_b if name == "edge" else [of_b, tesdf.NO_CELL])
+    touching = linked.touching_features(found)
+    for kinds, ids, name in ((touching.a_kind, touching.a, "a"), (touching.b_kind, touching.b, "b")):
+        for kind, row, contact in zip(kinds, ids.tolist(), contacts):
+            [(of, names)] = contact["touching_features"][name].items()
+            assert kind == KINDS[of] and row == (names if of == "edge" else [names, tesdf.NO_CELL])
     assert vars(found.statistics) == expected["statistics"]
     for rows, name in ((found.reductions, "reductions"), (found.hidden, "hidden")):
         assert len(rows) == len(expected[name]) and (name == "hidden" or len(rows) == ("mode" not in options and len(options) == 2))

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 use tesdf::collide::{
     CoarseContact, CollideOptions, Contact, Contacts, ContactsPer, HiddenOverlap, Instance, InstanceId, Mode,
-    PairReduction, Pose, Reduction, Scene, Statistics, coarse_contacts, detect,
+    PairReduction, Pose, Reduction, Scene, Statistics, TouchingFeatures, coarse_contacts, detect,
 };
 use tesdf::{Length, TeSdf};
 
@@ -119,10 +119,26 @@ pub struct Args {
     pub report: bool,
 }
 
+/// A contact in the output of `--json`.
+#[derive(Serialize)]
+struct Named<'a> {
+    #[serde(flatten)]
+    contact: &'a Contact,
+    touching_features: TouchingFeatures,
+}
+
+/// The contacts that a detection in this scene found, with the features that touch.
+fn named<'a>(found: &'a Contacts, scene: &Scene) -> Result<Vec<Named<'a>>, Failure> {
+    let of = |contact: &'a Contact| {
+        Ok(Named { contact, touching_features: contact.touching_features(scene).map_err(Failure::new)? })
+    };
+    found.iter().map(of).collect()
+}
+
 /// The output of `--json --report`.
 #[derive(Serialize)]
 struct Report<'a> {
-    contacts: &'a [Contact],
+    contacts: Vec<Named<'a>>,
     statistics: &'a Statistics,
     reductions: &'a [PairReduction],
     hidden: &'a [HiddenOverlap],
@@ -199,9 +215,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     if args.report {
         let Contacts { statistics, reductions, hidden, .. } = &found;
-        report::json(&Report { contacts: found.as_slice(), statistics, reductions, hidden })?;
+        report::json(&Report { contacts: named(&found, &scene)?, statistics, reductions, hidden })?;
     } else if args.json {
-        report::json(&found.as_slice())?;
+        report::json(&named(&found, &scene)?)?;
     } else {
         report::text(&text(&found))?;
     }

@@ -124,6 +124,7 @@ fn measure(
     repeat: u32,
 ) -> Result<Measured, Failure> {
     let (mut walls, mut reports, mut hashes) = (Vec::new(), Vec::new(), Hashes::default());
+    let mut kept = Vec::new();
     for frame in 0..frames.poses.len() {
         frames.show(frame)?;
         // The first detection grows the buffers and compiles the kernels.
@@ -136,6 +137,7 @@ fn measure(
             let contacts = detector.detect_timed(&frames.scene, options).map_err(Failure::new)?;
             hashes.add(frame, contacts.as_slice())?;
             reports.push(detector.report().clone());
+            kept.push(contacts.len() as f64);
         }
     }
     let stage = |k: usize| {
@@ -160,7 +162,7 @@ fn measure(
             contacts: count(|c| c.contacts),
             filtered: count(|c| c.filtered),
             kept: matches!(options.reduction, Reduction::PerPair(_) | Reduction::Spread(_))
-                .then(|| count(|c| c.kept)),
+                .then(|| Spread::of(kept)),
             candidates: count(|c| c.candidates),
             queries_unpruned: None,
             evaluations: Some(count(|c| c.evaluations)),

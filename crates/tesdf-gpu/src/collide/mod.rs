@@ -115,11 +115,15 @@ impl Detector {
     /// in `f32`. Points, normals and distances are in the world frame and the world's unit.
     ///
     /// - The tolerance of the exact mode is at least 1e-6 in the local frame.
-    /// - A reduction follows the rules of the processor, but compares bounds of distances instead
-    ///   of distances. So it may keep other contacts. With contacts per face it also chooses among
-    ///   several contacts at one vertex, of which otherwise one remains.
-    /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So
-    ///   it saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
+    /// - The normals of contacts of faces are those that both bodies allow, as on the processor,
+    ///   which finds them from the contacts that it reads. After
+    ///   [`move_vertices`](Self::move_vertices) it does not know the shapes, and normals are
+    ///   gradients of the signed distance.
+    /// - Contacts of nodes are reduced on the device. This follows the rules of the processor, but
+    ///   compares bounds of distances instead of distances. So it may keep other contacts.
+    /// - Contacts of faces are reduced on the processor, because the loss depends on their normals;
+    ///   so are those of [`Reduction::Deepest`]. This saves no time here. [`Reduction::Spread`] is
+    ///   [`Reduction::PerPair`] here.
     /// - In the field of an open mesh under the rule
     ///   [`Generalized`](tesdf::base::InsideRule::Generalized), a search along a jump needs more
     ///   rounds than elsewhere. It ends after the same number, and says `converged: false` sooner.
@@ -177,7 +181,7 @@ impl Detector {
             });
         }
         // These are known on the processor only.
-        let of_processor = matches!(reduction, Reduction::Deepest(_)) || wants_minima(options);
+        let of_processor = matches!(reduction, Reduction::Deepest(_)) || self.has_cones(options);
         if reduction == Reduction::None || !of_processor {
             return self.find(scene, options, timing);
         }
@@ -185,7 +189,9 @@ impl Detector {
         let (mut statistics, hidden) = (all.statistics, all.hidden.clone());
         let (contacts, reductions) = reduce_pairs(all.into_vec(), options.reduction);
         statistics.reduced = statistics.touching - statistics.filtered - contacts.len();
-        statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
+        if matches!(reduction, Reduction::Deepest(_)) {
+            statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
+        }
         Ok(Contacts::new(contacts, statistics, reductions, hidden))
     }
 
@@ -295,7 +301,7 @@ impl Detector {
             one_per_vertex(&shapes, instances, &mut words, &mut rows);
         }
         let (mut contacts, faces) = contacts(&shapes, instances, options.mode, &words, &rows);
-        if parts(options) == Parts::Faces && wants_minima(options) {
+        if self.has_cones(options) {
             let all = contacts.len();
             contacts = in_cones(scene, options, &contacts, &faces)?;
             filtered += all - contacts.len();
@@ -320,6 +326,12 @@ impl Detector {
         };
         let hidden = HiddenOverlap::not_shown(self.overlaps(instances)?, &contacts);
         Ok(Contacts::new(contacts, statistics, reductions, hidden))
+    }
+
+    /// Whether the processor knows the normal cones of contacts: those of faces that have not moved
+    /// on the device.
+    fn has_cones(&self, options: &CollideOptions) -> bool {
+        parts(options) != Parts::Nodes && !self.shapes.have_moved()
     }
 
     /// The buffers with the contacts of the last pass, or with those that a reduction kept.

@@ -42,7 +42,8 @@ pub struct DeviceContacts {
     /// `[N, 3]`: the points of the second instance's surface that are closest to these.
     pub points_b: DeviceArray<f32>,
     /// `[N, 3]`: unit gradients of the signed distance of the second instance; from the second to
-    /// the first.
+    /// the first. [`detect`](Detector::detect) instead gives contacts of faces normals that both
+    /// bodies allow.
     pub normals: DeviceArray<f32>,
     /// `[N]`: signed distances.
     pub distances: DeviceArray<f32>,

@@ -10,6 +10,7 @@ mod degenerate;
 mod encode;
 mod hidden;
 mod inside_rules;
+mod normal_cones;
 #[cfg(feature = "cuda")]
 mod nvrtc;
 mod on_device;

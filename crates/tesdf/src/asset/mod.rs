@@ -28,6 +28,8 @@ mod error;
 mod face_record;
 #[cfg(feature = "collide")]
 mod faces_at;
+#[cfg(feature = "collide")]
+mod faces_by_id;
 mod header;
 mod incidence;
 mod inner_ball;

@@ -76,6 +76,8 @@ pub struct TeSdf {
     pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
     #[cfg(feature = "collide")]
+    pub(super) faces_by_id: OnceLock<Vec<u32>>,
+    #[cfg(feature = "collide")]
     faces_at: OnceLock<FacesAt>,
     #[cfg(feature = "collide")]
     pub(super) corner_cones: OnceLock<Vec<f32>>,
@@ -168,6 +170,8 @@ impl TeSdf {
             cell_bounds: OnceLock::new(),
             motion: None,
             lowest_faces: OnceLock::new(),
+            #[cfg(feature = "collide")]
+            faces_by_id: OnceLock::new(),
             #[cfg(feature = "collide")]
             faces_at: OnceLock::new(),
             #[cfg(feature = "collide")]

@@ -15,11 +15,10 @@ pub struct Contact {
     pub point_a: DVec3,
     /// The point of b's surface that is closest to `point_a`.
     pub point_b: DVec3,
-    /// A unit vector from b to a: ∇φ_b at `point_a`. Contacts of whole faces
-    /// ([`ContactsPer::Face`](super::ContactsPer::Face),
-    /// [`ContactsPer::Minimum`](super::ContactsPer::Minimum)) have a direction that both bodies
-    /// allow instead, where one is near: the normal of the face that meets an edge or a vertex, the
-    /// common normal of edges that cross (`docs/math.md`, section 18).
+    /// A unit vector from b to a: ∇φ_b at `point_a`. In the modes [`Face`](super::Mode::Face) and
+    /// [`Exact`](super::Mode::Exact) a direction that both bodies allow instead, where one is near:
+    /// the normal of the face that meets an edge or a vertex, the common normal of edges that cross
+    /// (`docs/math.md`, section 18).
     pub normal: DVec3,
     /// φ_b at `point_a`; negative where the bodies penetrate. With
     /// [`ContactsPer::Minimum`](super::ContactsPer::Minimum), the distance along the normal.
@@ -36,6 +35,7 @@ pub struct Contact {
     /// The body whose field is used.
     pub instance_b: InstanceId,
     /// The touching features. It stays the same from step to step while the same features touch.
+    /// [`touching_features`](Self::touching_features) also names the vertex or edge of a.
     pub feature: FeatureId,
     /// Whether it is proved that no point of the face is deeper by more than the tolerance.
     /// False when a search was cut short, and where no bound proves a result of the mode
@@ -52,7 +52,7 @@ pub struct FeatureId {
     pub b: FeatureB,
 }
 
-/// The feature of a mesh that is closest to a point.
+/// The feature of a mesh that is closest to a point, or that touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FeatureB {

@@ -76,6 +76,7 @@ mod simple;
 mod spread;
 mod surface;
 mod time_of_impact;
+mod touching_features;
 mod why;
 
 /// Constants and functions that the kernels of `tesdf-gpu` and their tests share with this crate.
@@ -118,4 +119,5 @@ pub use scene::{Groups, Instance, Scene, Velocity};
 pub use shape::Shape;
 pub use shape_ray::ShapeHit;
 pub use time_of_impact::{FreeUntil, Impact, TimeOfImpact, TimeOfImpactOptions, time_of_impact};
+pub use touching_features::TouchingFeatures;
 pub use why::{BroadVerdict, PairVerdict, PartReport, PolygonReport, PolygonVerdict, WhyReport, why};

@@ -26,12 +26,14 @@ pub enum Mode {
 #[serde(rename_all = "snake_case")]
 pub enum ContactsPer {
     /// A face of body *a* in one cell of body *b*, as in the paper: the least signed distance over
-    /// the part of the face in that cell. A face has as many contacts as it meets cells.
+    /// the part of the face in that cell. A face has as many contacts as it meets cells. The normal
+    /// is a direction that both bodies allow, where the way between the points is along one.
     Cell,
     /// A face of body *a*: its least signed distance over all cells. Where the face lies flat on
     /// body *b*, or is large, the extremes of the part that touches are contacts too, so that a box
-    /// stands on its corners. Of equally near faces of *b*, the one that opposes the face gives the
-    /// normal. Faces that have the same vertex as their contact share it.
+    /// stands on its corners. The normal is as for [`Cell`](Self::Cell); where both bodies allow
+    /// none, of equally near faces of *b*, the one that opposes the face gives it. Faces that have
+    /// the same vertex as their contact share it.
     Face,
     /// A local minimum of the signed distance over the surface of body *a*: the contacts of
     /// [`Face`](Self::Face), without those beside which the surface is lower, where the distance

@@ -38,7 +38,7 @@ pub struct OrderedPair<'a> {
     pub reach: Reach,
     /// The search for minima, up to the greatest of these distances.
     pub search: Search,
-    /// The normal cones, where contacts are those of whole faces.
+    /// The normal cones, where contacts are those of faces.
     pub cones: Option<Cones<'a>>,
     /// Whether the bodies close by so much within the speculative time that they may touch at other
     /// places than local minima.
@@ -101,7 +101,7 @@ impl<'a> OrderedPair<'a> {
         let least = options.contact_distance.min(contact_distance);
         let reach = Reach::new(&ahead_a.approach(&ahead_b), &field, contact_distance, least);
         let is_of_faces = matches!(options.mode, Mode::Face | Mode::Exact);
-        let cones = (is_of_faces && options.contacts_per != ContactsPer::Cell).then(|| {
+        let cones = is_of_faces.then(|| {
             let tolerance = options.tolerance.resolve(diagonals[1]);
             let shapes = [(shape_a, of_a.placement()), (shape_b, of_b.placement())];
             Cones::new(shapes, tolerance, options.precision)
@@ -186,11 +186,8 @@ impl<'a> OrderedPair<'a> {
         }
         let contact = self.touching(part, minimum, ids);
         let Some(cones) = &self.cones else { return Ok(contact) };
-        let turned = cones.of(contact, [candidate, minimum.value.position]);
-        match self.options.contacts_per {
-            ContactsPer::Minimum => turned.ok_or(Dropped::OutOfCones),
-            ContactsPer::Cell | ContactsPer::Face => Ok(cones.beside(contact, turned)),
-        }
+        let faces = [candidate, minimum.value.position];
+        cones.contact(contact, faces, self.options.contacts_per).ok_or(Dropped::OutOfCones)
     }
 
     fn check_face(&self, part: &Part, candidate: u32, minimum: &Minimum, cosine: f64) -> Result<(), Dropped> {

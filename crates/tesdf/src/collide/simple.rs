@@ -210,6 +210,12 @@ const NODES: [(usize, u32); 8] = {
     nodes
 };
 
+/// The node of a box at the corner that is at the positive end of these axes.
+pub fn box_node(is_high: [bool; 3]) -> u32 {
+    let corner = (0..3).map(|axis| usize::from(is_high[axis]) << axis).sum::<usize>();
+    NODES.iter().position(|&(other, _)| other == corner).unwrap_or(0) as u32
+}
+
 fn box_corner(half: DVec3, corner: usize) -> DVec3 {
     DVec3::from_array(std::array::from_fn(
         |axis| {

@@ -90,8 +90,8 @@ fn wide(k: usize, relation: Relation, bodies: &[Placed]) -> f64 {
     share * bodies[0].diagonal()
 }
 
-/// Checks the guarantees of a contact.
-fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
+/// Checks the guarantees of a contact. Returns whether its normal is the gradient.
+fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) -> bool {
     let (a, b) = (&bodies[c.instance_a.0 as usize], &bodies[c.instance_b.0 as usize]);
     let diagonal = a.diagonal().max(b.diagonal());
     let rounding = ROUNDING * size(bodies) + 1e-12 * diagonal;
@@ -107,10 +107,17 @@ fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
     assert!((asked - c.distance).abs() < rounding, "{} query: {asked}", what());
     let on_b = Triangle::new(b.body.face(c.face_b, b.at));
     assert!(on_b.closest(c.point_b).distance < rounding, "{}", what());
+    let mut is_gradient = true;
     if c.distance.abs() > 1e-6 * diagonal + 1e6 * rounding {
-        // The normal is the gradient. It equals the gradient of the query, unless another point is
-        // equally near.
-        assert!(c.normal.distance(between / c.distance) < 1e-5, "{}", what());
+        // The normal is the gradient; or of a face one that both bodies allow, as far as the place is
+        // known (`docs/math.md`, section 18).
+        let off = c.normal.distance(between / c.distance);
+        is_gradient = off < 1e-5;
+        let known = 1e-6 * diagonal + (8.0 * COARSE * b.diagonal() * c.distance.abs()).sqrt();
+        assert!(is_gradient || mode != Mode::Node && off * c.distance.abs() <= known, "{}", what());
+    }
+    if is_gradient && c.distance.abs() > 1e-6 * diagonal + 1e6 * rounding {
+        // It equals the gradient of the query, unless another point is equally near.
         let same = (b.at.to_world(answer.closest_point) - c.point_b).length() < 1e-6 * diagonal;
         let gradient = b.at.pose.rotation * answer.gradient;
         assert!(!same || c.normal.distance(gradient) < 1e-3, "{} query: {gradient}", what());
@@ -123,6 +130,7 @@ fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
     } else {
         assert_eq!(c.feature.a, c.face_a);
     }
+    is_gradient
 }
 
 /// Contacts are sorted by pair, order, face and cell. Contacts per cell: a face has at most one in
@@ -259,7 +267,9 @@ fn no_contact_is_lost() {
                 let of_others = detect(&swapped, &options).expect("a good scene");
                 count += found.len();
                 is_sorted(found.as_slice(), ContactsPer::Cell);
-                found.iter().for_each(|c| is_sound(c, bodies, mode, contact_distance));
+                let is_turned = |c: &&Contact| !is_sound(c, bodies, mode, contact_distance);
+                let turned = found.iter().filter(is_turned).count();
+                assert!(10 * turned <= found.len() + 20, "{turned} of {} normals, {mode:?}", found.len());
                 assert_eq!(renamed(of_others.as_slice()), {
                     let mut all = found.as_slice().to_vec();
                     all.sort_by_key(|c| c.instance_a);

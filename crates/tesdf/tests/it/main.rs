@@ -58,5 +58,6 @@ mod support;
 mod tetrahedra_read;
 mod time_of_impact;
 mod too_many_intersections;
+mod touching_features;
 mod verify;
 mod wild_meshes;

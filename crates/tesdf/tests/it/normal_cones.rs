@@ -7,6 +7,7 @@ use tesdf::collide::{
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 
+use crate::support::blocks::{self, Block, Kind};
 use crate::support::bodies::rotation;
 use crate::support::random::Random;
 use crate::support::shapes;
@@ -20,63 +21,22 @@ const ON_SIDE: f64 = 5e-6;
 /// Bodies of size 1 are apart where their distance is greater.
 const APART: f64 = 1e-5;
 
-/// A box, as a mesh or a shape.
-#[derive(Clone, Copy, Debug)]
-enum Kind {
-    Mesh,
-    Formula,
-}
-
-/// A box in the world.
-#[derive(Clone, Copy, Debug)]
-struct Block {
-    kind: Kind,
-    half: DVec3,
-    pose: Pose,
-}
-
-impl Block {
-    fn shape(&self) -> Shape {
-        match self.kind {
-            Kind::Formula => Shape::Box { half_extents: self.half },
-            Kind::Mesh => {
-                let solid = shapes::Shape::default().add_box(-self.half, self.half, 1).solid();
-                Shape::Mesh(Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid).expect("a box")))
-            }
-        }
-    }
-
-    /// How far a direction is out of the cone of the normals of the sides within `near` of a point:
-    /// the length of what must be taken from it. The normals are the axes, so each component of the
-    /// direction, in the frame of the box, must be 0 off the sides, and of their sign at them.
-    fn out_of_cone(&self, point: DVec3, direction: DVec3, near: f64) -> f64 {
-        let (p, d) = (self.pose.to_body(point), self.pose.rotation.inverse() * direction);
-        let excess = |axis: usize| {
-            let at_side = self.half[axis] - p[axis].abs() <= near;
-            if at_side { (-d[axis] * p[axis].signum()).max(0.0) } else { d[axis].abs() }
-        };
-        DVec3::from_array([0, 1, 2].map(excess)).length()
-    }
-
-    /// The number of sides within `near` of a point.
-    fn sides_at(&self, point: DVec3, near: f64) -> usize {
-        let p = self.pose.to_body(point);
-        (0..3).filter(|&axis| self.half[axis] - p[axis].abs() <= near).count()
-    }
-}
-
-fn contacts(blocks: &[Block; 2], mode: Mode) -> Vec<Contact> {
+fn scene(blocks: &[Block; 2]) -> Scene {
     let mut scene = Scene::new();
     for block in blocks {
         let shape = scene.add_shape(block.shape()).expect("a good shape");
         scene.add(Instance::new(shape, block.pose)).expect("a good pose");
     }
-    let options = CollideOptions {
-        contacts_per: ContactsPer::Minimum,
-        contact_distance: 2e-3,
-        ..CollideOptions::with_mode(mode)
-    };
-    detect(&scene, &options).expect("contacts").into_vec()
+    scene
+}
+
+fn contacts_per(blocks: &[Block; 2], mode: Mode, contacts_per: ContactsPer) -> Vec<Contact> {
+    let options = CollideOptions { contacts_per, contact_distance: 2e-3, ..CollideOptions::with_mode(mode) };
+    detect(&scene(blocks), &options).expect("contacts").into_vec()
+}
+
+fn contacts(blocks: &[Block; 2], mode: Mode) -> Vec<Contact> {
+    contacts_per(blocks, mode, ContactsPer::Minimum)
 }
 
 /// Two boxes of size 1 that nearly touch at random features: `gap` is the distance along the
@@ -142,6 +102,48 @@ fn normals_are_in_the_cones_of_both_bodies() {
         }
     }
     assert!(seen > 1000, "{seen} contacts, at most {worst} out of a cone");
+}
+
+/// Contacts per face and per cell keep their points, which need not be the nearest places of two
+/// features. Where bodies touch there and have a direction in both cones, the normal is such a one.
+#[test]
+fn normals_per_face_and_cell_are_in_the_cones_where_these_meet() {
+    let mut random = Random(0xced);
+    let (mut seen, mut none) = (0, 0);
+    for round in 0..200 {
+        let blocks = touching(&mut random, [0.0, 1e-12, 1e-9, 1e-7, -1e-12, -1e-9][round % 6]);
+        for per in [ContactsPer::Face, ContactsPer::Cell] {
+            let found = contacts_per(&blocks, Mode::Exact, per).into_iter();
+            for c in found.filter(|c| c.converged && c.distance.abs() <= 1e-6) {
+                let [a, b] = if c.instance_a == InstanceId(0) { blocks } else { [blocks[1], blocks[0]] };
+                let near = ON_SIDE + 2.0 * c.distance.abs();
+                let out = |n: DVec3| {
+                    let of_a = a.out_of_cone(c.point_a, -n, near);
+                    // A face of b is a wall for all points of a.
+                    let of_a = if b.sides_at(c.point_b, near) == 1 { 0.0 } else { of_a };
+                    of_a.max(b.out_of_cone(c.point_b, n, near))
+                };
+                // The normals of faces and the common normals of edges.
+                let (of_a, of_b) = (a.axes(), b.axes());
+                let across = of_a.iter().flat_map(|p| of_b.map(|q| p.cross(q).normalize_or(*p)));
+                let directions = of_a.into_iter().chain(of_b).chain(across).flat_map(|n| [n, -n]);
+                // Up to the tolerance of faces that are parallel.
+                let is_allowed = directions.map(out).any(|out| out < 1e-4);
+                seen += usize::from(is_allowed);
+                none += usize::from(!is_allowed);
+                let own = out(c.normal);
+                assert!(!is_allowed || own <= 1.01 * SLOPE, "{own} out of a cone, {per:?}: {blocks:?} {c:?}");
+            }
+        }
+    }
+    assert!(seen > 1000, "{seen} contacts, and {none} without a common direction");
+}
+
+#[test]
+fn edges_are_pushed_along_the_normal_of_the_floor_in_each_mode() {
+    let detect = |scene: &Scene, options: &CollideOptions| detect(scene, options).expect("contacts");
+    // Of the diagonals: 1e-6 of the smaller one, and the tolerance of the larger one.
+    blocks::edges_are_pushed_along_the_normal_of_the_floor(&detect, [7.8e-7, 7.8e-7]);
 }
 
 /// A contact of a face with an edge or a vertex has the normal of the face, whichever body has it,

@@ -19,6 +19,9 @@ pub const MOST_OTHERS: f64 = 0.01;
 /// borders, and faces that lie in borders.
 pub const MOST_CELLS: f64 = 0.02;
 
+/// Largest share of contacts with a normal that is not the gradient.
+const MOST_TURNED: f64 = 0.05;
+
 /// The device that `TESDF_DEVICE` names, or the best device.
 pub fn device() -> Device {
     Device::choose(None).expect("a device: `./test` makes the replacement of CUDA's driver")
@@ -54,8 +57,9 @@ pub fn field(scene: &Scene, id: InstanceId, p: DVec3) -> f64 {
     instance.scale * exact(shape, instance.placement().to_shape(p))
 }
 
-/// Checks a contact against the exact field.
-pub fn is_true(scene: &Scene, c: &Contact, size: f64) {
+/// Checks a contact against the exact field. Its normal is the gradient, or of a face one that the
+/// normal cones of both bodies allow, as far as the place is known (`docs/math.md`, section 18).
+pub fn is_true(scene: &Scene, mode: Mode, c: &Contact, size: f64) {
     let (a, b) = (c.instance_a, c.instance_b);
     let instance = scene.instance(a).expect("it is there");
     let shape = scene.shape(instance.shape).expect("it is there");
@@ -84,8 +88,29 @@ pub fn is_true(scene: &Scene, c: &Contact, size: f64) {
         assert!(surface.abs() < 2.0 * ROUNDING * size, "{c:?}: point b is {surface} off the surface");
     }
     assert!((c.normal.length() - 1.0).abs() < 1e-5);
-    let ahead = c.point_b + c.distance * c.normal;
-    assert!(ahead.distance(c.point_a) < 3.0 * ROUNDING * size, "{c:?}: normal");
+    let diagonal = |id: InstanceId| {
+        let instance = scene.instance(id).expect("it is there");
+        instance.scale * scene.shape(instance.shape).expect("it is there").diagonal()
+    };
+    let larger = [a, b].map(diagonal).into_iter().filter(|d| d.is_finite()).fold(0.0, f64::max);
+    let place = if mode == Mode::Node { 0.0 } else { (8.0 * ROUNDING * larger * c.distance.abs()).sqrt() };
+    assert!(beside_the_way(c) < 3.0 * ROUNDING * size + place, "{c:?}: normal");
+}
+
+/// How far a step along the normal, as long as the distance, ends beside the point of *a*.
+fn beside_the_way(c: &Contact) -> f64 {
+    (c.point_b + c.distance * c.normal).distance(c.point_a)
+}
+
+/// Checks that few normals are not the gradients within rounding.
+fn few_are_turned(contacts: &Contacts, size: f64) {
+    let turned = contacts.iter().filter(|c| beside_the_way(c) >= 3.0 * ROUNDING * size).count();
+    println!("{turned} of {} normals are no gradients", contacts.len());
+    assert!(
+        turned as f64 <= 2.0 + MOST_TURNED * contacts.len() as f64,
+        "{turned} of {} normals are no gradients",
+        contacts.len()
+    );
 }
 
 /// The least distance of each part of an ordered pair.
@@ -145,7 +170,8 @@ impl Compared {
 pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
     let (device, _) = found(scene, options, DetectorOptions::default());
     let most = 1 + device.len() / 1000;
-    device.iter().step_by(most).for_each(|c| is_true(scene, c, size));
+    device.iter().step_by(most).for_each(|c| is_true(scene, options.mode, c, size));
+    few_are_turned(&device, size);
     hold_against(scene, options, size, &device)
 }
 

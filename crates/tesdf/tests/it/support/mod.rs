@@ -3,6 +3,7 @@
 //! alone.
 #![allow(dead_code, reason = "each test program uses its own part")]
 
+pub mod blocks;
 pub mod bodies;
 pub mod brute_inside;
 pub mod cells;

@@ -1,0 +1,263 @@
+//! Normals of contacts from the normal cones of the features that touch; proof in `docs/math.md`,
+//! section 18.
+//!
+//! The gradient of the signed distance says in which direction the distance of one point changes.
+//! Where a body lies on another one, this is the normal of any face of *b* that is as near, also
+//! where an edge of *b* lies on a face of *a*: as a plane, such a contact is a wall that is not
+//! there. And the point is only known to the tolerance of its distance, so just apart the gradient
+//! is off by √(2 tolerance / distance). A contact's normal must be in the cone of the outward
+//! normals at the place of *b*, and its opposite in that of *a*: a face has one, an edge the arc
+//! between its two faces, a vertex the cone of its faces.
+mod around;
+mod cone;
+mod elsewhere;
+
+use glam::DVec3;
+
+use super::field::ROUNDING;
+use super::{Contact, ContactsPer, Placement, Shape};
+use crate::query::Precision;
+use around::around;
+use cone::{Cone, Normals, PARALLEL, SAME, clamped, common, crossing, least_cosine};
+pub use elsewhere::{in_cones, keep_different};
+
+/// A place belongs to a feature when it is nearer than this: parts of the diagonals of the smaller
+/// and of the larger body. The search knows a place to its tolerance.
+const OF_SMALLER: f64 = 1e-6;
+const OF_LARGER: f64 = 2e-7;
+
+/// The normal cones of two bodies, in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Cones<'a> {
+    a: Body<'a>,
+    b: Body<'a>,
+    /// The diagonals, in the world.
+    sizes: [f64; 2],
+    near: f64,
+    /// Bound of the error of a distance.
+    tolerance: f64,
+}
+
+/// A shape in the world.
+#[derive(Clone, Copy, Debug)]
+struct Body<'a> {
+    shape: &'a Shape,
+    placement: Placement,
+}
+
+/// A place on a body or in it, in the world.
+struct Place {
+    at: DVec3,
+    /// Faces up to this distance belong to it.
+    limit: f64,
+    /// One of them, by its index in the shape.
+    face: u32,
+}
+
+impl<'a> Cones<'a> {
+    /// Of the body that has the faces, and the body whose field is used. `tolerance` is the bound of
+    /// the error of distances in the world's unit, and `precision` is that of the contacts.
+    pub fn new([a, b]: [(&'a Shape, Placement); 2], tolerance: f64, precision: Precision) -> Self {
+        let [a, b] = [a, b].map(|(shape, placement)| Body { shape, placement });
+        let sizes = [a, b].map(|body| body.shape.diagonal() * body.placement.scale);
+        let finite = sizes.into_iter().filter(|size| size.is_finite());
+        let (least, most) = finite.fold((f64::INFINITY, 0.0f64), |(l, m), s| (l.min(s), m.max(s)));
+        let rounding = match precision {
+            Precision::F64 => OF_LARGER,
+            Precision::F32 => ROUNDING,
+        };
+        let near = (OF_SMALLER * least.min(f64::MAX)).max(rounding * most);
+        Self { a, b, sizes, near, tolerance: tolerance.max(near) }
+    }
+
+    /// The distance up to which two places are one, in the world's unit.
+    pub fn near(&self) -> f64 {
+        self.near
+    }
+
+    /// The error of the place of a contact at a distance: the distance of a point beside the nearest
+    /// one exceeds it by the square of the way over twice the distance.
+    fn place(&self, distance: f64) -> f64 {
+        self.near + (8.0 * self.tolerance * distance.abs()).sqrt()
+    }
+
+    /// A contact of a face as a detection reports it, with the normal that the cones allow. `faces`
+    /// are the indices of its faces in the shapes. Per local minimum, its distance is that along
+    /// the normal, and `None` is a contact that there is not; others keep their points and
+    /// distances.
+    pub fn contact(&self, contact: Contact, faces: [u32; 2], per: ContactsPer) -> Option<Contact> {
+        let turned = self.of(contact, faces);
+        match per {
+            ContactsPer::Minimum => turned,
+            ContactsPer::Cell | ContactsPer::Face => Some(self.beside(contact, turned)),
+        }
+    }
+
+    /// A contact of a face with the normal that the cones allow, and its distance along that
+    /// normal. `faces` are the indices of its faces in the shapes. `None` where they allow none: no
+    /// motion of the bodies brings these features together before others.
+    ///
+    /// Contacts of open meshes and sheets, at places that are not convex, and those that are deeper
+    /// than the features are known, stay as they are.
+    fn of(&self, contact: Contact, faces: [u32; 2]) -> Option<Contact> {
+        let keep = Some(contact);
+        let Contact { point_a, point_b, distance, normal, .. } = contact;
+        let Some(of_a) = self.a.normals(&Place { at: point_a, limit: self.near, face: faces[0] }) else {
+            return keep;
+        };
+        if let Some(radius) = self.b.radius() {
+            return self.of_round(contact, &of_a, radius);
+        }
+        let is_apart = distance > self.near;
+        // Inside of b, the faces of one place are equally near. Outside, they have the nearest point.
+        let place = match is_apart {
+            true => Place { at: point_b, limit: self.near, face: faces[1] },
+            false => Place { at: point_a, limit: distance.abs() + 2.0 * self.near, face: faces[1] },
+        };
+        let Some(of_b) = self.b.normals(&place) else { return keep };
+        // Above a plane, only its normal holds, however deep.
+        let is_deep = distance < -self.near && !matches!(self.a.shape, Shape::Plane);
+        let otherwise = if is_deep { keep } else { None };
+        let along = |normal: DVec3| Some(Contact { normal, ..contact });
+        // The common normal of two edges.
+        let across = match (of_a.as_slice(), of_b.as_slice()) {
+            ([a, b], [c, d]) => crossing([a, b], [c, d]),
+            _ => None,
+        };
+        match (of_a.as_slice(), of_b.as_slice(), across) {
+            // The corners of a patch are at edges or vertices of one of them.
+            ([m], [h], _) => {
+                if h.distance(-*m) <= PARALLEL {
+                    along(self.flush(-*m, *h))
+                } else {
+                    otherwise
+                }
+            }
+            // The plane of the face: the way to it from the nearest point of b.
+            ([m], ..) => match (Cone::new(of_b.iter().copied()).is_near(-*m), is_apart) {
+                (false, _) => otherwise,
+                (true, true) => self.turned(contact, -*m),
+                (true, false) => along(-*m),
+            },
+            (_, [h], _) => {
+                if Cone::opposite(&of_a).is_near(*h) {
+                    along(*h)
+                } else {
+                    keep
+                }
+            }
+            (.., Some(across)) => {
+                // The distance along the common normal of two edges is the same between all points
+                // of their lines.
+                let n = if across.dot(normal) < 0.0 { -across } else { across };
+                let cones = [Cone::opposite(&of_a), Cone::new(of_b.iter().copied())];
+                let is_allowed = |n: DVec3| cones.iter().all(|cone| cone.is_near(n));
+                if is_apart {
+                    let distance = n.dot(point_a - point_b);
+                    if is_allowed(n) { Some(Contact { normal: n, distance, ..contact }) } else { keep }
+                } else {
+                    // The gradient may be the normal of a face along the edge of a, on neither side.
+                    [n, -n].into_iter().find(|n| is_allowed(*n)).map_or(otherwise, along)
+                }
+            }
+            _ if is_apart => {
+                // The gradient of the exact place is in both cones.
+                let within = clamped(&Cone::opposite(&of_a), &Cone::new(of_b.iter().copied()), normal);
+                within.and_then(|normal| self.turned(contact, normal)).or(keep)
+            }
+            _ => {
+                // The mean is the same in both orders of a pair. The gradient, moved into the
+                // cones, is not: two such contacts would be a notch that locks.
+                let rays = common(&Cone::opposite(&of_a), &Cone::new(of_b.iter().copied()));
+                match rays.iter().sum::<DVec3>().try_normalize() {
+                    Some(mean) => along(mean),
+                    None if rays.is_empty() => otherwise,
+                    None => keep,
+                }
+            }
+        }
+    }
+
+    /// The normal of two faces that lie flush on each other, as far as bodies turn in a step. That
+    /// of the larger body: a small one that comes to lie on it gets no push to the side. Of bodies
+    /// of one size it is the mean. Both are the same in both orders.
+    fn flush(&self, of_a: DVec3, of_b: DVec3) -> DVec3 {
+        let [a, b] = self.sizes;
+        if a > (1.0 + SAME) * b {
+            of_a
+        } else if b > (1.0 + SAME) * a {
+            of_b
+        } else {
+            (of_a + of_b).normalize()
+        }
+    }
+
+    /// A contact of bodies that are apart with another normal, and its distance along it. `None` where
+    /// this is not the direction from one point to the other, as far as the places are known and
+    /// the bodies may turn.
+    fn turned(&self, contact: Contact, normal: DVec3) -> Option<Contact> {
+        let Contact { point_a, point_b, distance, .. } = contact;
+        let way = point_a - point_b;
+        let is_right = normal.dot(contact.normal) > least_cosine()
+            || way.distance(distance * normal) <= self.place(distance);
+        is_right.then(|| Contact { normal, distance: normal.dot(way), ..contact })
+    }
+
+    /// A contact of a face that keeps its distance and its points: its normal is that of `turned`
+    /// where the way from one point to the other is along it, as far as the place is known.
+    fn beside(&self, contact: Contact, turned: Option<Contact>) -> Contact {
+        let Contact { point_a, point_b, distance, .. } = contact;
+        let is_along = |normal: &DVec3| {
+            let way = point_a - point_b;
+            way.distance(distance * *normal) <= self.place(distance)
+        };
+        let normal = turned.map(|turned| turned.normal).filter(is_along).unwrap_or(contact.normal);
+        Contact { normal, ..contact }
+    }
+
+    /// A contact of a ball or capsule of a radius, in the world, with faces of these normals. The
+    /// gradient is exact there, because it begins at the core.
+    fn of_round(&self, contact: Contact, of_a: &[DVec3], radius: f64) -> Option<Contact> {
+        let &[m] = of_a else { return Some(contact) };
+        let core = contact.point_b - radius * contact.normal;
+        let height = m.dot(core - contact.point_a);
+        let foot = core - height * m;
+        if height > 0.0 && foot.distance(contact.point_a) <= self.place(height) {
+            let (normal, point_b) = (-m, core - radius * m);
+            return Some(Contact { point_a: foot, point_b, normal, distance: height - radius, ..contact });
+        }
+        // The core is over another face, or inside.
+        (height <= 0.0 || !contact.converged).then_some(contact)
+    }
+}
+
+impl Body<'_> {
+    /// Radius of a rounded shape, in the world.
+    fn radius(&self) -> Option<f64> {
+        match *self.shape {
+            Shape::Sphere { radius } | Shape::Capsule { radius, .. } => Some(radius * self.placement.scale),
+            _ => None,
+        }
+    }
+
+    /// The different outward normals of the faces around a place, in the world. `None` where they
+    /// are no cone: at rounded shapes, borders, and where the surface is concave.
+    fn normals(&self, place: &Place) -> Option<Normals> {
+        let at = self.placement.to_shape(place.at);
+        let limit = place.limit / self.placement.scale;
+        let local = match self.shape {
+            Shape::Plane => [DVec3::Z].into_iter().collect(),
+            Shape::Box { half_extents } => {
+                let side = |axis: usize| {
+                    let sign = if at[axis] < 0.0 { -1.0 } else { 1.0 };
+                    (half_extents[axis] - at[axis].abs() <= limit).then(|| sign * DVec3::AXES[axis])
+                };
+                (0..3).filter_map(side).collect()
+            }
+            Shape::Mesh(asset) => around(asset, at, limit, place.face)?,
+            Shape::Sphere { .. } | Shape::Capsule { .. } => return None,
+        };
+        let rotation = self.placement.pose.rotation;
+        (!local.is_empty()).then(|| local.into_iter().map(|n| rotation * n).collect())
+    }
+}
