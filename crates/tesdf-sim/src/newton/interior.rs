@@ -22,6 +22,7 @@
 //! iterates and then stay, a convex problem, and those are corrected a few times (lagged friction:
 //! Kaufman et al., *Staggered projections for frictional contact in multibody systems*, 2008).
 mod iteration;
+mod state;
 
 use iteration::Iterate;
 use nalgebra::Vector6;
