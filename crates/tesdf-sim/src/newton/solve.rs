@@ -35,8 +35,10 @@ impl Guess<'_> {
         let mut of_island = island.rows.iter().map(|&k| &rows[k]);
         let is_solved = match gap {
             Gap::Position => island.bodies.iter().all(|&k| step.resting[k]),
-            // The minimisation before was of the same problem.
-            Gap::Relaxed => of_island.all(|row| row.relaxed_gap == row.gap),
+            // The minimisation before was of the same problem, if no row parted bodies in it.
+            Gap::Relaxed => {
+                of_island.all(|row| row.relaxed_gap == row.gap && row.resistance != Resistance::Parting)
+            }
         };
         let forces = self.forces.filter(|_| is_solved)?;
         Some(Minimum {
