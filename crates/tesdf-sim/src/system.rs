@@ -59,6 +59,11 @@ impl State {
         Self { pose, linear: DVec3::ZERO, angular: DVec3::ZERO }
     }
 
+    /// Whether it moves.
+    pub(crate) fn has_velocity(&self) -> bool {
+        self.linear != DVec3::ZERO || self.angular != DVec3::ZERO
+    }
+
     /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.pose.translation.is_finite()

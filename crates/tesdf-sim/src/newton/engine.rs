@@ -161,7 +161,7 @@ impl Newton {
         let mut states = self.system.states().to_vec();
         for (body, state) in self.system.bodies().iter().zip(&mut states) {
             // Without a velocity the pose stays bit for bit.
-            if body.mass == Mass::Kinematic && *state != State::at_rest(state.pose) {
+            if body.mass == Mass::Kinematic && state.has_velocity() {
                 state.pose = moved(DVec3::ZERO, state.pose, &velocity(state), step.h);
             }
         }

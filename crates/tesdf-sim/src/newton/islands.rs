@@ -42,6 +42,15 @@ pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
     islands
 }
 
+/// Marks all bodies of each island that rows make of a marked one.
+pub fn spread(marked: &mut [bool], rows: &[Row]) {
+    for island in islands(marked.len(), rows) {
+        if island.bodies.iter().any(|&k| marked[k]) {
+            island.bodies.iter().for_each(|&k| marked[k] = true);
+        }
+    }
+}
+
 /// Makes one group of those of `a` and `b`.
 pub fn join(parent: &mut [usize], a: usize, b: usize) {
     let (a, b) = (root(parent, a), root(parent, b));

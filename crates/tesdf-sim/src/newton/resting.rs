@@ -8,19 +8,19 @@ use nalgebra::Vector6;
 use tesdf::collide::Contact;
 
 use super::Newton;
-use super::islands::islands;
+use super::islands::spread;
 use super::rows::Row;
-use super::sleep::pairs_of;
+use super::sleep::{joined, pairs_of};
 use super::step::Step;
-use crate::{Mass, State};
+use crate::Mass;
 
 /// A body rests in a step when no point of it moves by more than this, m: what a minimisation from
 /// kept forces leaves.
 const STAYS: f64 = 1e-12;
 
 impl Newton {
-    /// Which free bodies rest in a step with these velocities. The rows are those of all joints, and
-    /// of the contacts that may act.
+    /// Which free bodies rest in a step with these velocities. The rows are those of all joints,
+    /// and of the contacts that may act.
     pub(super) fn resting(
         &self,
         step: &Step,
@@ -28,36 +28,32 @@ impl Newton {
         rows: &[Row],
         velocities: &[Vector6<f64>],
     ) -> Vec<bool> {
-        let zero = vec![Vector6::zeros(); velocities.len()];
-        let ways = self.ways(step, &zero, velocities);
-        let mut resting: Vec<bool> = ways.zip(&step.deep).map(|(way, deep)| way <= STAYS && !deep).collect();
-        if !resting.contains(&true) {
-            return resting;
-        }
-        // Their contacts move, although the body may not.
-        let joints = self.system.joints().iter().filter_map(|joint| Some([joint.parent?, joint.child]));
-        for [a, b] in pairs_of(contacts, &self.system).chain(joints) {
-            for (moving, body) in [(a, b), (b, a)] {
-                if self.is_driven(moving)
-                    && let Some(free) = step.free_of[body]
-                {
-                    resting[free] = false;
+        let mut moves = self.move_at(step, velocities);
+        moves.iter_mut().zip(&step.deep).for_each(|(moves, deep)| *moves |= deep);
+        if moves.contains(&false) {
+            // Where what they touch is driven, their contacts move, although they may not.
+            for [a, b] in pairs_of(contacts, &self.system).chain(joined(&self.system)) {
+                for (other, body) in [(a, b), (b, a)] {
+                    if let Some(free) = step.free_of[body] {
+                        moves[free] |= self.is_driven(other);
+                    }
                 }
             }
+            spread(&mut moves, rows);
         }
-        for island in islands(step.free.len(), rows) {
-            if island.bodies.iter().any(|&k| !resting[k]) {
-                island.bodies.iter().for_each(|&k| resting[k] = false);
-            }
-        }
-        resting
+        moves.into_iter().map(|moves| !moves).collect()
     }
 
     /// Whether a body that rests moves with these velocities.
     pub(super) fn stirs(&self, step: &Step, velocities: &[Vector6<f64>]) -> bool {
-        let zero = vec![Vector6::zeros(); velocities.len()];
-        let mut ways = self.ways(step, &zero, velocities).zip(&step.resting);
-        step.resting.contains(&true) && ways.any(|(way, resting)| *resting && way > STAYS)
+        let moves = || self.move_at(step, velocities).into_iter();
+        step.resting.contains(&true) && moves().zip(&step.resting).any(|(moves, resting)| moves && *resting)
+    }
+
+    /// Of each free body whether it moves at these velocities.
+    fn move_at(&self, step: &Step, velocities: &[Vector6<f64>]) -> Vec<bool> {
+        let still = vec![Vector6::zeros(); velocities.len()];
+        self.ways(step, &still, velocities).map(|way| way > STAYS || way.is_nan()).collect()
     }
 
     /// Marks the bodies that do not move in the step as still, so that nothing is detected between
@@ -74,7 +70,6 @@ impl Newton {
 
     /// Whether a body is kinematic and has a velocity.
     fn is_driven(&self, body: usize) -> bool {
-        let state = self.system.states()[body];
-        self.system.bodies()[body].mass == Mass::Kinematic && state != State::at_rest(state.pose)
+        self.system.bodies()[body].mass == Mass::Kinematic && self.system.states()[body].has_velocity()
     }
 }

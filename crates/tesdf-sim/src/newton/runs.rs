@@ -1,8 +1,7 @@
 //! Sorts what comes in runs.
 
 /// `items` sorted by group and key; equal ones keep their order. Those of a group come together and
-/// mostly in order, as contacts do: then this takes as long as to read them, and a sixth of the
-/// time of a sort of ten thousand.
+/// mostly in order, as contacts do: then each group is read, and only the groups are sorted.
 pub fn sort_runs<T: Copy, G: Ord, K: Ord>(
     items: Vec<T>,
     group: impl Fn(&T) -> G,

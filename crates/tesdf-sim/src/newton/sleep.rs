@@ -187,11 +187,10 @@ impl Newton {
         let NewtonOptions { sleep: longest, .. } = self.options;
         let (system, asleep) = (&self.system, &mut self.sleep);
         for (k, (body, state)) in system.bodies().iter().zip(system.states()).enumerate() {
-            let has_velocity = !(state.linear.length() == 0.0 && state.angular.length() == 0.0);
             asleep.still[k] = match body.mass {
                 Mass::Fixed => !asleep.displaced[k],
-                Mass::Kinematic => !asleep.displaced[k] && !has_velocity,
-                Mass::Free(_) => asleep.rests[k].time >= longest && !has_velocity,
+                Mass::Kinematic => !asleep.displaced[k] && !state.has_velocity(),
+                Mass::Free(_) => asleep.rests[k].time >= longest && !state.has_velocity(),
             };
         }
         let pulled = asleep.touched(joined(system), system);
@@ -416,7 +415,7 @@ fn is_free(system: &System, body: usize) -> bool {
 }
 
 /// The pairs of bodies that joints connect.
-fn joined(system: &System) -> impl Iterator<Item = [usize; 2]> {
+pub fn joined(system: &System) -> impl Iterator<Item = [usize; 2]> {
     system.joints().iter().filter_map(|joint| Some([joint.parent?, joint.child]))
 }
 

@@ -29,8 +29,8 @@ pub struct Guess<'a> {
 }
 
 impl Guess<'_> {
-    /// The guess for an island, where it is known to be the solution: its bodies rest, and its rows are
-    /// as before.
+    /// The guess for an island, where it is known to be the solution: its bodies rest, and its rows
+    /// are as before.
     fn solved(&self, step: &Step, island: &Island, rows: &[Row], gap: Gap) -> Option<Minimum> {
         let mut of_island = island.rows.iter().map(|&k| &rows[k]);
         let is_solved = match gap {

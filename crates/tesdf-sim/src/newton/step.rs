@@ -40,8 +40,9 @@ impl Step {
         row.sides.iter().flatten().any(|(k, _)| self.deep[*k])
     }
 
-    /// Whether a contact stays as it was found at the beginning of the step. A deep body that is pushed
-    /// into another one must not kick it, and between bodies that rest nothing else would be found.
+    /// Whether a contact stays as it was found at the beginning of the step. A deep body that is
+    /// pushed into another one must not kick it, and between bodies that rest nothing else would be
+    /// found.
     pub fn stays(&self, row: &Row) -> bool {
         self.is_deep(row) || row.sides.iter().flatten().all(|(k, _)| self.resting[*k])
     }

@@ -11,7 +11,7 @@ use super::deep::pair;
 use super::far::Reach;
 use super::geometric::{Loads, Motion, Start};
 use super::integrate::{unpack, velocity};
-use super::islands::islands;
+use super::islands::spread;
 use super::joints::{joint_rows, predict};
 use super::rows::{Resistance, Row, RowForce};
 use super::solve::{Gap, Guess, carry_rows, from_last};
@@ -238,13 +238,8 @@ impl Newton {
             let bodies = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
             bodies.iter().flatten().filter_map(|&b| step.free_of[b]).for_each(|k| deep[k] = true);
         }
-        if !deep.contains(&true) {
-            return deep;
-        }
-        for island in islands(step.free.len(), rows) {
-            if island.bodies.iter().any(|&k| deep[k]) {
-                island.bodies.iter().for_each(|&k| deep[k] = true);
-            }
+        if deep.contains(&true) {
+            spread(&mut deep, rows);
         }
         deep
     }

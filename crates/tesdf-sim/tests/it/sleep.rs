@@ -16,8 +16,8 @@ const STEP: f64 = 5e-3;
 /// How far runs with and without sleep may be apart, m.
 const TOLERANCE: f64 = 1e-6;
 
-/// The same some steps after a hit of 2 m/s, m: the corners of flush faces are known to 1e-6 of a body,
-/// 0.1 µm, and at other corners the hit turns a box by 0.2 mrad/s more.
+/// The same some steps after a hit of 2 m/s, m: the corners of flush faces are known to 1e-6 of a
+/// body, 0.1 µm, and at other corners the hit turns a box by 0.2 mrad/s more.
 const AFTER_HIT: f64 = 2e-5;
 
 /// A kinematic plate of 1 m² whose top is at z = 0.

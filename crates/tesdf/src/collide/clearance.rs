@@ -145,8 +145,8 @@ impl<'a> Pair<'a> {
     /// As [`clearance`], except for the tolerance.
     pub fn new(scene: &'a Scene, a: InstanceId, b: InstanceId) -> Result<Self, CollideError> {
         let body = |id| {
-            let instance = scene.instance(id)?;
-            Ok(Body { id, shape: scene.shape(instance.shape)?, placement: instance.placement() })
+            let (shape, placement) = scene.placed(id)?;
+            Ok(Body { id, shape, placement })
         };
         let pair = Self { a: body(a)?, b: body(b)? };
         let none = |reason| Err(CollideError::NoClearance { a, b, reason });

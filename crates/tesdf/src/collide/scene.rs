@@ -289,6 +289,15 @@ impl Scene {
         self.at(id).map(|at| &self.instances[at])
     }
 
+    /// The shape of an instance, and where it is.
+    ///
+    /// # Errors
+    /// [`CollideError::NoInstance`], and [`CollideError::NoShape`].
+    pub(crate) fn placed(&self, id: InstanceId) -> Result<(&Shape, Placement), CollideError> {
+        let instance = self.instance(id)?;
+        Ok((self.shape(instance.shape)?, instance.placement()))
+    }
+
     /// A shape.
     ///
     /// # Errors

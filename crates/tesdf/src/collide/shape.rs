@@ -119,6 +119,12 @@ impl Shape {
     }
 }
 
+/// Of two sizes the smaller and the larger one; infinite ones, those of planes, do not count.
+pub(super) fn least_and_most(sizes: [f64; 2]) -> (f64, f64) {
+    let finite = sizes.into_iter().filter(|size| size.is_finite());
+    finite.fold((f64::INFINITY, 0.0), |(least, most), size| (size.min(least), size.max(most)))
+}
+
 impl From<&Shape> for Simple {
     /// For any shape except a mesh. A mesh has no formula and becomes a point.
     fn from(shape: &Shape) -> Self {

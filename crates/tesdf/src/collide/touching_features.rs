@@ -2,8 +2,9 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use super::shape::least_and_most;
 use super::simple::box_node;
-use super::{CollideError, Contact, FeatureB, InstanceId, Placement, Scene, Shape};
+use super::{CollideError, Contact, FeatureB, Placement, Scene, Shape};
 use crate::TeSdf;
 use crate::geometry::Triangle;
 
@@ -33,9 +34,9 @@ impl Contact {
     /// [`feature`](Self::feature) instead has the face of *a*, and of *b* the nearest feature to
     /// `point_a`, also where this is beside an edge by less than contacts are known.
     ///
-    /// Of a box, vertices have the numbers of its nodes, edges those of their two vertices, and faces
-    /// those of its sides, 0 to 5 for −x +x −y +y −z +z, as in `face_b`. Planes, spheres and capsules
-    /// have the face 0.
+    /// Of a box, vertices have the numbers of its nodes, edges those of their two vertices, and
+    /// faces those of its sides, 0 to 5 for −x +x −y +y −z +z, as in `face_b`. Planes, spheres and
+    /// capsules have the face 0.
     ///
     /// `scene` is that of the detection, with the same poses. Contacts do not keep the answer:
     /// it costs time only where it is asked for, and no memory.
@@ -69,14 +70,9 @@ impl Contact {
     /// # }
     /// ```
     pub fn touching_features(&self, scene: &Scene) -> Result<TouchingFeatures, CollideError> {
-        let body = |id: InstanceId| {
-            let instance = scene.instance(id)?;
-            Ok((scene.shape(instance.shape)?, instance.placement()))
-        };
-        let bodies: [(&Shape, Placement); 2] = [body(self.instance_a)?, body(self.instance_b)?];
+        let bodies = [scene.placed(self.instance_a)?, scene.placed(self.instance_b)?];
         let sizes = bodies.map(|(shape, placement)| shape.diagonal() * placement.scale);
-        let finite = sizes.into_iter().filter(|size| size.is_finite());
-        let (least, most) = finite.fold((f64::INFINITY, 0.0f64), |(l, m), s| (l.min(s), m.max(s)));
+        let (least, most) = least_and_most(sizes);
         let near = (OF_LARGER * most).min(OF_SMALLER * least);
         let [a, b] = bodies;
         Ok(TouchingFeatures {

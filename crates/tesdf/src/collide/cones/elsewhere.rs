@@ -1,9 +1,7 @@
 //! Contacts that were found elsewhere, as on a GPU, and contacts that both orders of a pair find.
 use super::Cones;
 use super::cone::{PARALLEL, SAME};
-use crate::collide::{
-    CollideError, CollideOptions, Contact, ContactsPer, InstanceId, Placement, Scene, Shape,
-};
+use crate::collide::{CollideError, CollideOptions, Contact, ContactsPer, Scene};
 use crate::parallel::*;
 use crate::query::Precision;
 
@@ -19,10 +17,6 @@ pub fn in_cones(
     contacts: &[Contact],
     faces: &[[u32; 2]],
 ) -> Result<Vec<Contact>, CollideError> {
-    let body = |id: InstanceId| {
-        let instance = scene.instance(id)?;
-        Ok((scene.shape(instance.shape)?, instance.placement()))
-    };
     let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
     let mut found = Vec::with_capacity(contacts.len());
     let mut faces = faces;
@@ -30,7 +24,7 @@ pub fn in_cones(
         let mut of_pair = Vec::with_capacity(run.len());
         let mut near = 0.0;
         for order in run.chunk_by(|x, y| x.instance_a == y.instance_a) {
-            let bodies: [(&Shape, Placement); 2] = [body(order[0].instance_a)?, body(order[0].instance_b)?];
+            let bodies = [scene.placed(order[0].instance_a)?, scene.placed(order[0].instance_b)?];
             let diagonal = bodies[1].0.diagonal().min(f64::MAX) * bodies[1].1.scale;
             let cones = Cones::new(bodies, options.tolerance.resolve(diagonal), Precision::F32);
             near = cones.near();

@@ -15,6 +15,7 @@ mod elsewhere;
 use glam::DVec3;
 
 use super::field::ROUNDING;
+use super::shape::least_and_most;
 use super::{Contact, ContactsPer, Placement, Shape};
 use crate::query::Precision;
 use around::around;
@@ -60,8 +61,7 @@ impl<'a> Cones<'a> {
     pub fn new([a, b]: [(&'a Shape, Placement); 2], tolerance: f64, precision: Precision) -> Self {
         let [a, b] = [a, b].map(|(shape, placement)| Body { shape, placement });
         let sizes = [a, b].map(|body| body.shape.diagonal() * body.placement.scale);
-        let finite = sizes.into_iter().filter(|size| size.is_finite());
-        let (least, most) = finite.fold((f64::INFINITY, 0.0f64), |(l, m), s| (l.min(s), m.max(s)));
+        let (least, most) = least_and_most(sizes);
         let rounding = match precision {
             Precision::F64 => OF_LARGER,
             Precision::F32 => ROUNDING,

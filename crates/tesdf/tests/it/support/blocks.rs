@@ -127,8 +127,8 @@ pub fn edges_are_pushed_along_the_normal_of_the_floor(
                     assert!(off <= known, "{off} beside the way, {mode:?} per {contacts_per:?}: {c:?}");
                 }
             }
-            // In the others, points are known less well than this. Frank–Wolfe seldom comes so near to
-            // the lowest point, and over a cell never.
+            // In the others, points are known less well than this. Frank–Wolfe seldom comes so near
+            // to the lowest point, and over a cell never.
             let least = match (mode, contacts_per) {
                 (Mode::Node | Mode::Exact, _) => worlds.len() / 2,
                 (Mode::Face, ContactsPer::Face | ContactsPer::Minimum) => worlds.len() / 8,
