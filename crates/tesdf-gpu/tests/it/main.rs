@@ -8,6 +8,7 @@ mod contacts_per_face;
 mod cuda_source;
 mod degenerate;
 mod encode;
+mod flush_patches;
 mod hidden;
 mod inside_rules;
 mod normal_cones;

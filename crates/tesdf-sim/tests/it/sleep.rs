@@ -17,8 +17,8 @@ const STEP: f64 = 5e-3;
 const TOLERANCE: f64 = 1e-6;
 
 /// The same some steps after a hit of 2 m/s, m: the corners of flush faces are known to 1e-6 of a
-/// body, 0.1 µm, and at other corners the hit turns a box by 0.2 mrad/s more.
-const AFTER_HIT: f64 = 2e-5;
+/// body, 0.1 µm, and at other corners the hit turns a box by some mrad/s more.
+const AFTER_HIT: f64 = 2e-4;
 
 /// A kinematic plate of 1 m² whose top is at z = 0.
 const PLATE: &str = r#"
@@ -175,24 +175,24 @@ fn a_stack_that_is_hit_from_below_passes_the_push_on_at_once() {
 fn a_stack_that_is_hit_by_free_bodies_wakes() {
     let ball = "[[bodies]]\nname = \"ball\"\nmass = 2\nshape = { sphere = { radius = 0.04 } }\n\
                 translation = [-0.3, 0, 0.04]\n";
-    // With friction a hit makes a tenth of a millimetre of the rounding by which flush faces have other
-    // contacts.
-    let scene = [PLATE, &stack(0.0, 3, 0.0), &stack(0.3, 2, 0.0), ball].concat();
-    let mut two = Two::at_rest(&scene, 6);
-    let fast = |engine: &mut Newton| {
-        let state = engine.system().states()[6];
-        engine.set_state(6, State { linear: 2.0 * DVec3::X, ..state }).unwrap();
-    };
-    two.set(fast);
-    // The other stack sleeps on: two boxes.
-    assert_eq!(two.run(STEP), [5, 0]);
-    // It hits after 0.105 s.
-    two.agree(20);
-    two.agree_within(AFTER_HIT, 4);
-    let states = two.states();
-    let [ball, moved] = [6, 1].map(|body| states[body].linear.x);
-    assert!(moved > 0.1 && ball < 1.5, "{moved} {ball}");
-    assert_eq!(two.run(STEP), [2, 0]);
+    for friction in [0.0, 0.5] {
+        let scene = [PLATE, &stack(0.0, 3, friction), &stack(0.3, 2, friction), ball].concat();
+        let mut two = Two::at_rest(&scene, 6);
+        let fast = |engine: &mut Newton| {
+            let state = engine.system().states()[6];
+            engine.set_state(6, State { linear: 2.0 * DVec3::X, ..state }).unwrap();
+        };
+        two.set(fast);
+        // The other stack sleeps on: two boxes.
+        assert_eq!(two.run(STEP), [5, 0]);
+        // It hits after 0.105 s.
+        two.agree(20);
+        two.agree_within(AFTER_HIT, 4);
+        let states = two.states();
+        let [ball, moved] = [6, 1].map(|body| states[body].linear.x);
+        assert!(moved > 0.1 && ball < 1.5, "{moved} {ball}");
+        assert_eq!(two.run(STEP), [2, 0]);
+    }
 }
 
 /// A body that comes to rest on others that sleep joins them, and nobody wakes again.

@@ -404,24 +404,27 @@ impl CellField<'_> {
             (Self::Mesh { asset, place, faces }, Precision::F64) => asset.opposing(p, normal, place, faces),
             (Self::Whole(around), Precision::F64) => around
                 .with_near(p, TIE, |found, near| around.asset.opposing_of(p, normal, found.into(), near)),
-            _ => self.most_opposing(p, normal, self.value(p, precision), precision),
+            _ => self.most_opposing(p, normal, TIE, self.value(p, precision), precision),
         }
     }
 
-    /// As [`opposing`](Self::opposing), where the `value` is known.
+    /// As [`opposing`](Self::opposing), where the `value` is known, and faces are equally near up to
+    /// `tie`.
     pub fn most_opposing(
         &self,
         p: DVec3,
         normal: DVec3,
+        tie: f64,
         value: FieldValue,
         precision: Precision,
     ) -> FieldValue {
         if opposes(&value, normal) {
             return value;
         }
-        let tie = if precision == Precision::F32 { ROUNDING } else { TIE };
+        let rounding = if precision == Precision::F32 { ROUNDING } else { TIE };
+        let tie = tie.max(rounding);
         let near = |asset: &TeSdf, faces: &Faces| {
-            asset.most_opposing(p, normal, value, tie, |offer| {
+            asset.most_opposing(p, normal, value, [tie, rounding], |offer| {
                 asset.faces_within(p, faces, value.distance.abs() + tie, &mut |face| {
                     offer(face, asset.local_triangle(face as usize).closest(p));
                 });
@@ -433,7 +436,7 @@ impl CellField<'_> {
                 Place::Listed { offset, .. } => asset.with_list(offset, |faces| near(asset, faces)),
                 _ => near(asset, &Faces::default()),
             },
-            Self::Simple(simple) => simple.most_opposing(p, normal, value),
+            Self::Simple(simple) => simple.most_opposing(p, normal, tie, value),
         }
     }
 }
@@ -448,7 +451,7 @@ fn opposes(value: &FieldValue, normal: DVec3) -> bool {
 const OPPOSITE: f64 = -0.999;
 
 /// Faces whose distances differ by less (local frame) are equally near.
-const TIE: f64 = 1e-12;
+pub const TIE: f64 = 1e-12;
 
 impl TeSdf {
     /// The value at a point outside whose nearest face is known; `None` on the surface.
@@ -480,25 +483,26 @@ impl TeSdf {
         if near.len() == 1 && !is_on_surface(&value, TIE) || opposes(&value, normal) {
             return value;
         }
-        self.most_opposing(p, normal, value, TIE, |offer| {
+        self.most_opposing(p, normal, value, [TIE; 2], |offer| {
             near.iter().for_each(|(face, closest)| offer(*face, *closest));
         })
     }
 
-    /// Of the faces at the distance of `value`, the one whose gradient most opposes `normal`.
-    /// `near` offers all faces up to this distance, and maybe others, with their nearest points.
+    /// Of the faces at the distance of `value`, up to `tie`, the one whose gradient most opposes
+    /// `normal`. Up to `rounding`, points are on the surface. `near` offers all faces up to this
+    /// distance, and maybe others, with their nearest points.
     fn most_opposing(
         &self,
         p: DVec3,
         normal: DVec3,
         value: FieldValue,
-        tie: f64,
+        [tie, rounding]: [f64; 2],
         near: impl FnOnce(&mut dyn FnMut(u32, Closest)),
     ) -> FieldValue {
         let limit = value.distance.abs() + tie;
         // On the surface the gradients are the normals of the faces, and of a sheet those of both
         // of its sides.
-        let on_surface = is_on_surface(&value, tie);
+        let on_surface = is_on_surface(&value, rounding);
         let (mut best, mut id) = (value, self.face_ids[value.position as usize]);
         near(&mut |face, closest| {
             if closest.distance > limit || face == value.position && !on_surface {

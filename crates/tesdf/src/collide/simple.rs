@@ -41,14 +41,14 @@ impl Simple {
         FieldValue { distance, gradient, closest_point, position, feature: Feature::Face }
     }
 
-    /// As `value` at `p`. Inside a box, where several sides are equally near, the gradient is that
-    /// which most opposes `normal`.
-    pub fn most_opposing(&self, p: DVec3, normal: DVec3, value: FieldValue) -> FieldValue {
+    /// As `value` at `p`. Inside a box, where several sides are equally near, up to `tie`, the
+    /// gradient is that which most opposes `normal`.
+    pub fn most_opposing(&self, p: DVec3, normal: DVec3, tie: f64, value: FieldValue) -> FieldValue {
         let Self::Box(half) = *self else { return value };
         if value.distance > 0.0 {
             return value;
         }
-        let tie = 1e-12 * half.max_element();
+        let tie = tie.max(1e-12 * half.max_element());
         let mut best = value;
         for axis in 0..3 {
             let depth = half[axis] - p[axis].abs();

@@ -27,6 +27,7 @@ mod exactness;
 mod examples;
 mod fans_and_needles;
 mod far_out;
+mod flush_patches;
 mod gmsh;
 mod golden_rules;
 mod gpu_preset;

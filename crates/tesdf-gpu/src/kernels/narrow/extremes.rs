@@ -2,8 +2,9 @@
 //! where the face is flat on the other body, or large, the extremes of what touches. The rules are
 //! those of `tesdf::collide::narrow::extremes`.
 //!
-//! Eight directions are searched at once. Four threads share a direction: they look for the
-//! farthest candidate, each among a quarter of the faces nearby.
+//! Eight directions are searched at once, then once more those out of the lines between neighbours of
+//! what was found. Four threads share a direction: they look for the farthest candidate, each among a
+//! quarter of the faces nearby.
 use cubecl::prelude::*;
 use tesdf::collide::internal;
 
@@ -25,8 +26,14 @@ use super::polygon_distance::weights_of;
 use super::taken::{Memory, Taken, nothing_at};
 use super::work::Work;
 
-/// Number of directions in the plane of a face.
+/// Number of directions in the plane of a face. Each has a slot for what was taken.
 pub const DIRECTIONS: u32 = internal::DIRECTIONS as u32;
+/// The slot of the minimum, ...
+const MINIMUM: u32 = DIRECTIONS;
+/// ... and that of what stands out between the first extreme and the second one.
+const BETWEEN: u32 = MINIMUM + 1;
+/// Number of slots.
+pub const SLOTS: u32 = BETWEEN + DIRECTIONS;
 /// A face is large when its longest edge exceeds this fraction of the smaller body's diagonal.
 const LARGE: f32 = internal::LARGE as f32;
 /// The field opposes a face when the cosine between gradient and normal is below this.
@@ -119,12 +126,13 @@ struct Patch {
 }
 
 /// A direction in the plane of a face: its products with both edges at the first corner.
-#[derive(CubeType, Clone, Copy)]
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Direction {
     s: f32,
     t: f32,
-    /// Only candidates whose height along the direction is below this are looked at.
+    /// Only candidates whose height along the direction is between these are looked at.
+    above: f32,
     below: f32,
 }
 
@@ -137,8 +145,16 @@ impl Direction {
     /// The farther of two candidates. Their "distance" is minus their height.
     fn farther(self, best: Lowest, at: Weights) -> Lowest {
         let height = self.height(at);
-        best.or(select(height < self.below, -height, FAR), at)
+        best.or(select(height > self.above && height < self.below, -height, FAR), at)
     }
+}
+
+/// A point in the plane of a face, and whether the face has it.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Inwards {
+    point: V3,
+    is_inside: bool,
 }
 
 /// Corner `k` of a face in weights.
@@ -165,11 +181,17 @@ impl Part {
         pick(u >= v && u >= w, ab, pick(v >= w, bc, ca))
     }
 
-    /// Whether a point lies over the part, or on it.
-    fn holds(self, normal: V3, p: V3) -> bool {
-        let on_ab = normal.cross(self.b - self.a).dot(p - self.a) >= 0.0f32;
-        let on_bc = normal.cross(self.c - self.b).dot(p - self.b) >= 0.0f32;
-        on_ab && on_bc && normal.cross(self.a - self.c).dot(p - self.c) >= 0.0f32
+    /// Whether a point lies over the part, or beyond a side by less than `beyond`.
+    fn holds(self, normal: V3, p: V3, beyond: f32) -> bool {
+        let mut holds = true;
+        let mut k = 0u32;
+        while k < 3u32 {
+            let start = self.corner(k);
+            let edge = self.corner(select(k == 2u32, 0u32, k + 1u32)) - start;
+            holds = holds && normal.cross(edge).dot(p - start) >= -beyond * edge.length();
+            k += 1u32;
+        }
+        holds
     }
 }
 
@@ -195,8 +217,25 @@ impl Facing<'_> {
         self.part.longest().length() > LARGE * diagonal
     }
 
+    /// A direction in the plane of the face.
+    fn along(self, to: V3) -> Direction {
+        let (ab, ac) = (self.part.b - self.part.a, self.part.c - self.part.a);
+        Direction { s: to.dot(ab), t: to.dot(ac), above: -FAR.runtime(), below: FAR.runtime() }
+    }
+
+    /// The direction out of the line between two neighbours of a patch. The corners between them stand
+    /// out from the line. Where both are the same, nothing does.
+    fn out_of(self, from: V3, to: V3) -> Direction {
+        let line = to - from;
+        let length = line.length();
+        let outward = line.cross(self.normal) * (1.0f32 / length.max(LEAST_DIVISOR));
+        let mut direction = self.along(outward);
+        direction.above = select(length > SAME, outward.dot(from - self.part.a) + SAME, FAR);
+        direction
+    }
+
     /// Direction `k`. Those of a face without a plane lead along its longest edge.
-    fn direction(self, k: u32, below: f32) -> Direction {
+    fn direction(self, k: u32) -> Direction {
         let longest = self.part.longest();
         let along = longest * (1.0f32 / longest.length().max(LEAST_DIVISOR));
         let across = self.normal.cross(along);
@@ -206,8 +245,7 @@ impl Facing<'_> {
         let x =
             select(steep, 0.382_683_43f32, 0.923_879_5f32) * select(k >= 2u32 && k < 6u32, -1.0f32, 1.0f32);
         let y = select(steep, 0.923_879_5f32, 0.382_683_43f32) * select(k >= 4u32, -1.0f32, 1.0f32);
-        let to = along * x + across * y;
-        Direction { s: to.dot(self.part.b - self.part.a), t: to.dot(self.part.c - self.part.a), below }
+        self.along(along * x + across * y)
     }
 
     /// Where the field is level from the minimum to another corner, within the tolerance, or the
@@ -263,19 +301,41 @@ impl Facing<'_> {
             let missing = v.distance + patch.depth;
             let sideways = v.gradient + patch.normal * -along;
             let square = sideways.dot(sideways);
-            let step = (BEYOND * missing.max(0.0f32) + HEIGHT) / square.max(LEVEL * LEVEL);
-            let next = found.point + sideways * -step;
+            let slope = square.sqrt().max(LEVEL);
+            let way = (BEYOND * missing.max(0.0f32) + HEIGHT) / slope;
+            let next = self.inwards(found.point, sideways * (1.0f32 / slope), way);
             let leads = square >= LEVEL * LEVEL && missing <= 2.0f32 * patch.depth;
             turn += 1u32;
-            open = !found.is_taken
-                && patch.depth > 0.0f32
-                && leads
-                && turn <= MOVES
-                && self.part.holds(self.plane, next);
-            found.point = pick(open, next, found.point);
+            open = !found.is_taken && patch.depth > 0.0f32 && leads && turn <= MOVES && next.is_inside;
+            found.point = pick(open, next.point, found.point);
             found.corner = select(open, NO_CORNER, found.corner);
         }
         found
+    }
+
+    /// The point of the face by this way from `p` against a direction: straight, or along a side
+    /// where that leaves the face, as at a sharp corner of the patch.
+    fn inwards(self, p: V3, outward: V3, way: f32) -> Inwards {
+        let straight = p + outward * -way;
+        let is_straight = self.part.holds(self.plane, straight, 0.0f32);
+        let mut point = straight;
+        let mut is_inside = is_straight;
+        let mut nearest = FAR.runtime();
+        let mut k = 0u32;
+        while k < 3u32 {
+            let side = self.part.corner(select(k == 2u32, 0u32, k + 1u32)) - self.part.corner(k);
+            let along = side * (1.0f32 / side.length().max(LEAST_DIVISOR));
+            let rise = along.dot(outward);
+            let length = way / rise.abs().max(LEVEL);
+            let next = p + along * select(rise < 0.0f32, length, -length);
+            let is_nearer = rise.abs() > LEVEL && length < nearest;
+            let taken = !is_straight && is_nearer && self.part.holds(self.plane, next, HEIGHT);
+            nearest = select(taken, length, nearest);
+            point = pick(taken, next, point);
+            is_inside = is_inside || taken;
+            k += 1u32;
+        }
+        Inwards { point, is_inside }
     }
 
     /// The farthest candidate along the direction of this thread: a corner of the face, a corner of
@@ -334,7 +394,7 @@ impl Facing<'_> {
             while k < 3u32 {
                 let c = f.corner(k);
                 let height = normal.dot(c - part.a);
-                if self.has_plane() && height.abs() <= limit && part.holds(normal, c) {
+                if self.has_plane() && height.abs() <= limit && part.holds(normal, c, 0.0f32) {
                     best = to.farther(best, weights_of(part, normal, c + normal * -height));
                 }
                 if k < edges {
@@ -415,17 +475,18 @@ impl Facing<'_> {
         let anywhere =
             Patch { limit: FAR.runtime(), opposes: 2.0f32, depth: 0.0f32, near: 0.0f32, normal: self.normal };
         let mut patch = anywhere;
-        let mut below = FAR.runtime();
+        let mut to = self.direction(direction);
         // Whether this thread's direction has no extreme yet.
         let mut searches = true;
-        // First the minimum itself, then candidates in all directions.
+        // First the minimum itself, then candidates in all directions, then those that stand out between
+        // two of them.
+        let mut slot = MINIMUM.runtime();
         let mut round = 0u32;
         let mut rounds = 1u32;
         while round < rounds {
-            let is_minimum = round == 0u32;
+            let is_minimum = slot == MINIMUM;
             let mut candidate = Lowest { distance: 0.0f32, at };
             if !is_minimum {
-                let to = self.direction(direction, below);
                 candidate = self.farthest(to, patch, &mut memory.walk, &mut memory.pool);
             }
             searches = searches && candidate.distance < FAR;
@@ -435,23 +496,29 @@ impl Facing<'_> {
                 let point = self.part.at(candidate.at.s, candidate.at.t);
                 let corner = corner_of(self.part, candidate.at);
                 taken = self.take(patch, point, corner, writes, &mut memory.pool.work);
-                below = -candidate.distance - SAME;
+                to.below = -candidate.distance - SAME;
             }
-            memory.points.put(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
-            let is_new = memory.points.is_new(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
+            memory.points.put(slot, round + 1u32, taken);
+            let is_new = memory.points.is_new(slot, round + 1u32, taken);
             if writes && taken.is_taken && is_new {
                 self.write(taken, converged, counters, contacts);
             }
+            searches = searches && !taken.is_taken;
+            let open = memory.pool.count(select(searches, 1u32, 0u32));
+            round += 1u32;
             if is_minimum {
                 patch = self.patch(taken);
                 rounds = select(patch.limit > -FAR, 1u32 + TRIALS, 1u32);
-                below = FAR.runtime();
-            } else {
-                searches = searches && !taken.is_taken;
-                let open = memory.pool.count(select(searches, 1u32, 0u32));
-                rounds = select(open.all == 0u32, round, rounds);
+                to.below = FAR.runtime();
+                searches = true;
+                slot = direction;
+            } else if open.all == 0u32 || round == rounds {
+                let next = memory.points.next(direction);
+                to = self.out_of(memory.points.get(direction), memory.points.get(next));
+                searches = slot == direction && next != direction && self.has_plane();
+                rounds = select(slot == direction, round + TRIALS, round);
+                slot = BETWEEN + direction;
             }
-            round += 1u32;
         }
     }
 }

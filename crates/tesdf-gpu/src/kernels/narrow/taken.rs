@@ -5,12 +5,9 @@ use super::super::field::nearest::FAR;
 use super::super::field::shapes::NONE;
 use super::super::field::value::Value;
 use super::super::math::vector::{V3, zero};
-use super::extremes::{DIRECTIONS, SAME};
+use super::extremes::{DIRECTIONS, SAME, SLOTS};
 use super::near::Walk;
 use super::piece::Pool;
-
-/// One for each direction, and one for the minimum.
-const SLOTS: usize = DIRECTIONS as usize + 1;
 
 /// A point of a face that is a contact, if `is_taken`.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
@@ -59,8 +56,8 @@ pub fn memory_of(pool: Pool, walk: Walk) -> Memory {
         pool,
         walk,
         points: Points {
-            numbers: Shared::<[f32]>::new_slice(comptime!(3 * SLOTS)),
-            rounds: Shared::<[u32]>::new_slice(SLOTS),
+            numbers: Shared::<[f32]>::new_slice(comptime!(3 * SLOTS as usize)),
+            rounds: Shared::<[u32]>::new_slice(comptime!(SLOTS as usize)),
         },
     }
 }
@@ -69,13 +66,13 @@ pub fn memory_of(pool: Pool, walk: Walk) -> Memory {
 impl Points {
     pub fn clear(&mut self) {
         sync_cube();
-        if UNIT_POS <= DIRECTIONS {
+        if UNIT_POS < SLOTS {
             self.rounds[UNIT_POS as usize] = 0u32;
         }
         sync_cube();
     }
 
-    fn get(&self, slot: u32) -> V3 {
+    pub fn get(&self, slot: u32) -> V3 {
         let at = (3u32 * slot) as usize;
         V3 { x: self.numbers[at], y: self.numbers[at + 1usize], z: self.numbers[at + 2usize] }
     }
@@ -93,12 +90,26 @@ impl Points {
         sync_cube();
     }
 
+    /// The next direction with a point after this one; this one, where it has none or there is no
+    /// other.
+    pub fn next(&self, direction: u32) -> u32 {
+        let mut next = direction;
+        let mut k = 1u32;
+        while k < DIRECTIONS {
+            let other = (direction + k) % DIRECTIONS;
+            let is_taken = self.rounds[other as usize] > 0u32;
+            next = select(next == direction && is_taken, other, next);
+            k += 1u32;
+        }
+        select(self.rounds[direction as usize] > 0u32, next, direction)
+    }
+
     /// Whether no other point that was taken is the same: neither in an earlier round, nor for a
     /// lower slot of this round.
     pub fn is_new(&self, own: u32, round: u32, taken: Taken) -> bool {
         let mut new = true;
         let mut slot = 0u32;
-        while slot <= DIRECTIONS {
+        while slot < SLOTS {
             let when = self.rounds[slot as usize];
             let is_before = when > 0u32 && (when < round || slot < own);
             let away = (self.get(slot) - taken.point).length();

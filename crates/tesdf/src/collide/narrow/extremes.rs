@@ -2,7 +2,8 @@
 //!
 //! The least signed distance over a face may be attained on a whole patch, for example under a box
 //! that stands on a table. One point of the patch cannot hold the box up. So the contacts are the
-//! points of the patch that are farthest along some directions in the face's plane.
+//! points of the patch that are farthest along some directions in the face's plane, and those that
+//! stand out between them.
 //!
 //! A patch between plane faces is a polygon. Its corners are corners of the face, corners of the
 //! other body's faces over it, or crossings of edges of both. These points are the candidates. A
@@ -20,6 +21,13 @@ use crate::query::Faces;
 /// Number of directions in the plane of a face. A polygon's corner with a right angle is an extreme
 /// of two of them.
 pub const DIRECTIONS: usize = 8;
+
+/// Most corners of a patch that are found.
+const MOST: usize = 2 * DIRECTIONS;
+
+/// A corner of a patch stands out from the line between its neighbours by more than this part of the
+/// longest edge of the face.
+const STANDS_OUT: f64 = 1e-6;
 
 /// The field opposes a face when the cosine between gradient and normal is below this.
 pub const OPPOSES: f64 = -0.5;
@@ -118,9 +126,9 @@ impl<'a> Patch<'a> {
         }
     }
 
-    /// Points of the patch other than the minimum, at most one for each direction.
-    pub fn extremes(mut self) -> ArrayVec<Minimum, DIRECTIONS> {
-        let mut found = ArrayVec::<Minimum, DIRECTIONS>::new();
+    /// Points of the patch other than the minimum: its corners, at most [`MOST`].
+    pub fn extremes(mut self) -> ArrayVec<Minimum, MOST> {
+        let mut found = ArrayVec::<Minimum, MOST>::new();
         if self.part.points().len() < 2 || !(self.is_large || self.may_be_flat()) {
             return found;
         }
@@ -128,12 +136,29 @@ impl<'a> Patch<'a> {
         let mut candidates = self.candidates();
         candidates.retain(|candidate| self.may_hold(candidate.point));
         for direction in self.directions() {
-            let Some(extreme) = self.farthest(direction, &mut candidates) else { continue };
-            let is_new = |other: &Minimum| other.point != extreme.point;
-            if is_new(self.minimum) && found.iter().all(is_new) {
+            let Some(extreme) = self.farthest(direction, f64::NEG_INFINITY, &mut candidates) else {
+                continue;
+            };
+            if found.iter().all(|other| other.point != extreme.point) {
                 found.push(extreme);
             }
         }
+        // The extremes are in their order around the patch. Corners between two of them stand out from
+        // the line through both.
+        let stands_out = STANDS_OUT * self.longest.length();
+        let mut k = 0;
+        let is_area = self.normal != DVec3::ZERO;
+        while is_area && k < found.len() && !found.is_full() {
+            let (from, to) = (found[k].point, found[(k + 1) % found.len()].point);
+            let outward = (to - from).cross(self.normal).normalize_or_zero();
+            match self.farthest(outward, outward.dot(from) + stands_out, &mut candidates) {
+                Some(corner) if found.iter().all(|other| other.point != corner.point) => {
+                    found.insert(k + 1, corner);
+                }
+                _ => k += 1,
+            }
+        }
+        found.retain(|corner| corner.point != self.minimum.point);
         found
     }
 
@@ -217,15 +242,15 @@ impl<'a> Patch<'a> {
         (0..DIRECTIONS).map(|k| angle(k).cos() * along + angle(k).sin() * across).collect()
     }
 
-    /// The contact of the candidate that is farthest along a direction among those that have one.
-    /// Removes candidates that have none.
-    fn farthest(&self, direction: DVec3, candidates: &mut Vec<Candidate>) -> Option<Minimum> {
+    /// The contact of the candidate that is farthest along a direction among those that have one, if
+    /// it is farther than `least`. Removes candidates that have none.
+    fn farthest(&self, direction: DVec3, least: f64, candidates: &mut Vec<Candidate>) -> Option<Minimum> {
         let mut limit = f64::INFINITY;
         for _ in 0..TRIALS {
             let mut next: Option<(f64, usize)> = None;
             for (i, candidate) in candidates.iter().enumerate() {
                 let at = direction.dot(candidate.point);
-                if at < limit && next.is_none_or(|(best, _)| at > best) {
+                if at > least && at < limit && next.is_none_or(|(best, _)| at > best) {
                     next = Some((at, i));
                 }
             }
@@ -286,10 +311,9 @@ impl<'a> Patch<'a> {
             if missing > 2.0 * depth || outward.length() < HEIGHT || slope < LEVEL {
                 break;
             }
-            moved -= outward.normalize() * (BEYOND * missing.max(0.0) / slope + HEIGHT);
-            if !self.holds(moved) {
-                break;
-            }
+            let way = BEYOND * missing.max(0.0) / slope + HEIGHT;
+            let Some(inside) = self.inwards(moved, outward.normalize(), way) else { break };
+            moved = inside;
             at = value(moved);
             if holds(&at) && is_over(moved, &at) {
                 return Some(minimum(moved, at, None));
@@ -301,6 +325,22 @@ impl<'a> Patch<'a> {
     /// The component of a vector in the plane of the face.
     fn along_face(&self, v: DVec3) -> DVec3 {
         v.reject_from_normalized(self.part.normal)
+    }
+
+    /// The point of the face by this way from `p` against a direction: straight, or along a side
+    /// where that leaves the face, as at a sharp corner of the patch.
+    fn inwards(&self, p: DVec3, outward: DVec3, way: f64) -> Option<DVec3> {
+        let along_side = |side: &Side| {
+            let along = side.inward.cross(self.part.normal).normalize_or_zero();
+            let rise = along.dot(outward);
+            (rise.abs() > LEVEL).then(|| p - way / rise * along)
+        };
+        let straight = p - way * outward;
+        if self.holds(straight) {
+            return Some(straight);
+        }
+        let inside = self.sides.iter().filter_map(along_side).filter(|q| self.holds(*q));
+        inside.min_by(|q, r| q.distance_squared(p).total_cmp(&r.distance_squared(p)))
     }
 
     /// Whether a point lies over the face, or on it.

@@ -7,7 +7,7 @@ pub mod jump;
 
 use glam::DVec3;
 
-use super::field::{CellField, Field, FieldBody, ROUNDING};
+use super::field::{CellField, Field, FieldBody, ROUNDING, TIE};
 use super::field_value::FieldValue;
 use super::middle::{self, ClippedPolygon};
 use super::polygon::Polygon;
@@ -15,7 +15,7 @@ use super::surface::Part;
 use super::{CollideOptions, ContactsPer, Mode};
 use crate::geometry::{Aabb, Triangle};
 use crate::query::{Faces, Place, Precision, Surroundings};
-use extremes::Patch;
+use extremes::{OPPOSES, Patch};
 
 /// The least signed distance of a part in one cell, in the field's frame.
 #[derive(Clone, Copy, Debug)]
@@ -227,8 +227,14 @@ impl Search {
         polygon(&whole);
         let reach = self.reach + part.radius;
         let Some(minimum) = self.in_cell(everywhere, &whole, part, reach) else { return };
-        let extremes = Patch::new(everywhere, part, &minimum, self).extremes();
-        found(&whole, minimum);
+        // The minimum is found up to the tolerance: at its point, near a border of the other body, the
+        // side of that body may be nearer than the face that the part is flat on.
+        let tie = self.tolerance.clamp(TIE, ROUNDING);
+        let value = everywhere.most_opposing(minimum.point, part.normal, tie, minimum.value, self.precision);
+        let on_face = Minimum { value, ..minimum };
+        let extremes = Patch::new(everywhere, part, &on_face, self).extremes();
+        let leans = minimum.value.gradient.dot(part.normal) >= OPPOSES;
+        found(&whole, if leans { on_face } else { minimum });
         extremes.into_iter().for_each(|extreme| found(&whole, extreme));
     }
 
@@ -285,7 +291,7 @@ impl Search {
         };
         let value = match (outside, self.per) {
             (Some(value), ContactsPer::Face | ContactsPer::Minimum) => {
-                cell.most_opposing(point, normal, value, self.precision)
+                cell.most_opposing(point, normal, TIE, value, self.precision)
             }
             _ => value,
         };

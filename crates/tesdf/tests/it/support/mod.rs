@@ -7,6 +7,7 @@ pub mod blocks;
 pub mod bodies;
 pub mod brute_inside;
 pub mod cells;
+pub mod flush;
 pub mod lowest;
 pub mod meshes;
 pub mod parts;
