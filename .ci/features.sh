@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/oldest.sh
 
 # Each format alone takes minutes for the crates that read it, and has few conditions in the code.
-for set in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf,collide threemf,vtu encode,collide,parallel,gltf,threemf,vtu,gmsh; do
+for set in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf,collide threemf encode,collide,parallel,gltf,threemf,gmsh; do
     check -p tesdf --no-default-features --features "$set"
 done
 

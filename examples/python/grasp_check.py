@@ -33,7 +33,7 @@ start = time.perf_counter()
 shape = scene.add_shape(finger)
 fingers = [scene.add_many(shape, hand @ side, world=worlds) for side in (left, right)]
 things = [scene.add_many(scene.add_shape(thing), rest, world=worlds) for thing in (peg, tesdf.Plane())]
-near = scene.detect(mode="node", contact_distance=ROOM, deepest=1)
+near = scene.detect(mode="node", contact_distance=ROOM, reduce=1)
 world = np.empty(4 * COUNT, int)
 world[np.concatenate(fingers + things)] = np.tile(worlds, 4)
 is_finger = np.isin(np.stack([near.instance_a, near.instance_b]), fingers).any(axis=0)  # the peg stands on the plane

@@ -12,7 +12,7 @@ use crate::errors::{argument, kind_of};
 
 /// The keywords, in the order of the documentation.
 const NAMES: &str = "mode, contacts_per, contact_distance, speculative_time, cos_theta, iterations, tolerance, reduce, \
-                     deepest, spread, precision or threads";
+                     spread, precision or threads";
 
 /// The options of a detection. They have the names and defaults of `tesdf collide`, and those of
 /// the library where the command has none.
@@ -43,15 +43,14 @@ impl Keywords {
                 "tolerance" => options.tolerance = tolerance(Some(&value), options.tolerance)?,
                 "precision" => options.precision = one_of(&name, &value, &PRECISIONS)?,
                 "threads" => found.threads = optional(&name, &value, threads)?,
-                "reduce" | "deepest" | "spread" => {
+                "reduce" | "spread" => {
                     let Some(kept) = optional(&name, &value, count)? else { continue };
                     if let Some((other, _)) = &reduction {
                         let found = format!("given together with {other}");
-                        return Err(argument(&name, found, "one of reduce, deepest and spread"));
+                        return Err(argument(&name, found, "one of them"));
                     }
                     let kind = match name.as_str() {
                         "reduce" => Reduction::PerPair(kept),
-                        "deepest" => Reduction::Deepest(kept),
                         _ => Reduction::Spread(kept),
                     };
                     reduction = Some((name, kind));

@@ -30,7 +30,7 @@ use crate::pool;
 ///   threshold that is large enough that no needed face is missing).
 /// - domain: the division of space into tetrahedra. None or "bisection" needs no other program.
 ///   "gmsh" runs Gmsh (the program of that name, or the one in the environment variable
-///   TESDF_GMSH). A path (.msh, .node, .ele, .vtu) has tetrahedra that conform to the mesh's faces.
+///   TESDF_GMSH). A path (.msh, .node, .ele) has tetrahedra that conform to the mesh's faces.
 /// - encoder: the method that finds the closest faces of each tetrahedron: "certified" (proven) or
 ///   "sampled" (as in the paper; faces that are closest only between samples may be missing). None
 ///   is the encoder of the preset.

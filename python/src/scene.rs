@@ -271,17 +271,16 @@ impl Scene {
     /// - iterations: number of Frank-Wolfe iterations in the mode "face".
     /// - tolerance: largest error in the mode "exact", in the world's unit. None is 1e-7 of the
     ///   diagonal of b.
-    /// - reduce, deepest, spread: at most this many contacts for each pair of instances; only one
-    ///   of them. reduce finds all contacts and keeps those that matter most for forces and
-    ///   torques. deepest finds only the deepest. spread finds contacts that are spread over the
-    ///   places that touch.
+    /// - reduce, spread: at most this many contacts for each pair of instances; only one of them.
+    ///   reduce finds all contacts and keeps those that matter most for forces and torques. spread
+    ///   finds contacts that are spread over the places that touch.
     /// - precision: "f64" or "f32", of distances, normals and points.
     /// - threads: number of threads; None is one per core.
     /// - device: "cpu", "gpu" (what TESDF_DEVICE names, else the best device), or the number of a
     ///   device or a part of its name, such as "cuda:0"; devices lists them. A device computes in
     ///   f32; docs/gpu/design.md says how far its contacts agree with the processor's. It keeps
     ///   the shapes until a detection on another device. Ctrl-C acts after the detection.
-    #[pyo3(signature = (*, device = None, **options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None, device='cpu')")]
+    #[pyo3(signature = (*, device = None, **options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None, device='cpu')")]
     fn detect<'py>(
         &self,
         py: Python<'py>,
@@ -306,7 +305,8 @@ impl Scene {
     /// within a pair, faces have the order of the asset. Normals are gradients of the signed distance,
     /// and contacts are reduced on the device. On a CUDA device other libraries use the
     /// arrays in place, and their poses are used in place. Only counters are copied to the processor,
-    /// and contacts only to tell whether they show a deep overlap that was found otherwise.
+    /// and contacts only to tell whether they show a deep overlap that was found otherwise. Where the
+    /// processor finds contacts of a body (docs/meshes.md), poses and contacts are copied.
     ///
     /// - poses: float32 [N, 7], x y z qx qy qz qw, a row for each instance in the order of ids: a
     ///   DeviceArray, memory of another library on this device (DLPack or __cuda_array_interface__),
@@ -314,9 +314,9 @@ impl Scene {
     ///   of the scene, which poses do not change.
     /// - velocities: float32 [N, 6], vx vy vz wx wy wz, likewise; only with poses. None: at rest.
     /// - device: as in detect; None is that of poses if these are a DeviceArray, else "gpu".
-    /// - The other options are those of detect. contacts_per="minimum", contacts per face without
-    ///   reduce, and deepest need the processor, and are DeviceErrors.
-    #[pyo3(signature = (*, poses = None, velocities = None, device = None, **options), text_signature = "($self, *, poses=None, velocities=None, device=None, mode='exact', contacts_per='cell', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
+    /// - The other options are those of detect. contacts_per="minimum", and contacts per face
+    ///   without reduce, need the processor, and are DeviceErrors.
+    #[pyo3(signature = (*, poses = None, velocities = None, device = None, **options), text_signature = "($self, *, poses=None, velocities=None, device=None, mode='exact', contacts_per='cell', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn detect_on_device<'py>(
         &self,
         py: Python<'py>,
@@ -345,7 +345,7 @@ impl Scene {
     /// instances: there, the mode "node" can miss where they touch. Returns
     /// CoarseContacts(instance_a, instance_b, face_a, corner_reach, distance). Options are those of
     /// detect; mode, contacts_per, cos_theta and the reductions are not used.
-    #[pyo3(signature = (**options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
+    #[pyo3(signature = (**options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn coarse_contacts<'py>(
         &self,
         py: Python<'py>,
@@ -497,7 +497,7 @@ impl Scene {
     ///
     /// part: the face or vertex of a (as face_a or feature_a of a contact). None reports all
     /// candidates. The options are those of detect; the report is that before a reduction.
-    #[pyo3(signature = (a, b, part = None, **options), text_signature = "($self, a, b, part=None, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
+    #[pyo3(signature = (a, b, part = None, **options), text_signature = "($self, a, b, part=None, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn why<'py>(
         &self,
         py: Python<'py>,

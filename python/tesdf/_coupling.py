@@ -118,8 +118,7 @@ class Detector:
         options = self._options
         per_cell = options["mode"] == "node" or options.get("contacts_per") == "cell"
         reduces = options.get("reduce") is not None or options.get("spread") is not None
-        is_possible = options.get("deepest") is None and options.get("contacts_per") != "minimum"
-        return self._number == cuda and is_possible and (per_cell or reduces)
+        return self._number == cuda and options.get("contacts_per") != "minimum" and (per_cell or reduces)
 
     def detect_on_device(self, poses: Any, velocities: Any, time_step: float) -> DeviceContacts:
         """Finds contacts where they stay, by arrays there: poses [N, 7], velocities [N, 6] of the shapes'

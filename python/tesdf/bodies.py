@@ -27,7 +27,6 @@ class WhyOptions(TypedDict, total=False):
     iterations: int
     tolerance: float | None
     reduce: int | None
-    deepest: int | None
     spread: int | None
     precision: Literal["f64", "f32"]
     threads: int | None

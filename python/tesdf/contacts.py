@@ -67,7 +67,7 @@ class Reductions(_Rows):
     instance_b: _Id
     """[P] the higher id"""
     contacts: npt.NDArray[np.uint64]
-    """[P] number of contacts before the reduction; with `deepest` and `spread`, of those found"""
+    """[P] number of contacts before the reduction; with `spread`, of those found"""
     kept: npt.NDArray[np.uint64]
     """[P] number of kept contacts"""
     wrench_error: _Float

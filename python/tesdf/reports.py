@@ -378,7 +378,7 @@ class DetectionStatistics:
     instance_pairs: int
     """ordered pairs of instances whose bounds overlap"""
     candidates: int
-    """faces or vertices that remain after the broad phase; with `deepest` and `spread`, this and all
+    """faces or vertices that remain after the broad phase; with `spread`, this and all
     other numbers count what was looked at"""
     polygons: int
     """pairs of a face and a cell, or of a vertex and its cell; with one contact per face, faces"""

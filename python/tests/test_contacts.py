@@ -55,7 +55,6 @@ OPTIONS = [
     {"mode": "face", "contacts_per": "cell", "iterations": 16, "cos_theta": 0.5},
     {"contacts_per": "minimum", "contact_distance": 0.05, "tolerance": 1e-6},
     {"contact_distance": 0.05, "reduce": 5},
-    {"contact_distance": 0.05, "deepest": 3},
     {"contact_distance": 0.05, "spread": 4},
 ]
 
@@ -66,7 +65,7 @@ def test_contacts_are_those_of_the_command(asset, file, linked, options):
     flags = [text for name, value in options.items() for text in ("--" + name.replace("_", "-"), str(value))]
     expected = command("collide", file, "--report", *flags)
     contacts = expected["contacts"]
-    assert len(found) == len(contacts) > (0 if options.get("deepest") or options.get("spread") else 4)
+    assert len(found) == len(contacts) > (0 if options.get("spread") else 4)
     for name in ("point_a", "point_b", "normal", "distance", "face_a", "face_b", "instance_a", "instance_b", "converged"):
         assert same(getattr(found, name), [c[name] for c in contacts]), name
     assert same(found.tet_b, [tesdf.NO_CELL if c["tet_b"] is None else c["tet_b"] for c in contacts])
@@ -140,7 +139,7 @@ def test_threads_change_nothing(asset):
     spread = [3, 3, 3, 1, 1, 1, 1]
     scene.add_many(scene.add_shape(asset), spread * random_poses(12))
     scene.add_many(scene.add_shape(tesdf.Capsule(0.5, 0.2)), spread * random_poses(12, seed=2))
-    for options in ({}, {"mode": "node"}, {"reduce": 4}, {"deepest": 4}):
+    for options in ({}, {"mode": "node"}, {"reduce": 4}):
         one, two = (scene.detect(threads=n, **options) for n in (1, 2))
         assert len(one) > 50 and one.statistics == two.statistics
         for a, b in zip((one, one.reductions, one.hidden), (two, two.reductions, two.hidden)):
@@ -307,7 +306,7 @@ def test_why_agrees_with_the_contacts(asset):
     ({"mode": "face", "iterations": 10**6}, tesdf.CollideError, "iterations is 1000000"),
     ({"iterations": -1}, ValueError, "iterations: -1; expected an integer from 0"),
     ({"reduce": 0}, tesdf.CollideError, "reduction is 0 contacts per pair"),
-    ({"reduce": 4, "spread": 4}, ValueError, "spread: given together with reduce; expected one of reduce, deepest and spread"),
+    ({"reduce": 4, "spread": 4}, ValueError, "spread: given together with reduce; expected one of them"),
     ({"threads": 0}, ValueError, "threads: 0; expected an integer greater than 0"),
 ])
 def test_invalid_options_are_errors(options, error, text):
@@ -325,11 +324,11 @@ def test_signatures_have_the_defaults(linked):
     for method in (linked.detect, linked.why, linked.coarse_contacts):
         parameters = inspect.signature(method).parameters.values()
         defaults = {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY}
-        assert len(defaults) == (13 if "device" in defaults else 12)
+        assert len(defaults) == (12 if "device" in defaults else 11)
         assert same(linked.detect(**defaults).distance, expected.distance)
     assert defaults.keys() < inspect.signature(linked.detect).parameters.keys() >= {"device"}
     parameters = inspect.signature(tesdf.InstancePairs.detect).parameters
-    assert {name: parameters[name].default for name in defaults} == defaults and len(parameters) == 15
+    assert {name: parameters[name].default for name in defaults} == defaults and len(parameters) == 14
 
 
 def test_bodies_of_two_functions(asset, torus):

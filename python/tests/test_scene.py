@@ -95,7 +95,7 @@ def test_matrices_are_poses():
     turned = np.sign((a[:, 3:] * b[:, 3:]).sum(1))  # q and -q are one rotation
     assert np.array_equal(a[:, :3], b[:, :3]) and np.abs(a[:, 3:] - turned[:, None] * b[:, 3:]).max() < 1e-14
     # Rounding can change which of several contacts of flat faces are found, but not the deepest one.
-    a, b = (scene.detect(deepest=1, tolerance=1e-9) for scene in (by_numbers, by_matrix))
+    a, b = (scene.detect(reduce=1, tolerance=1e-9) for scene in (by_numbers, by_matrix))
     a, b = (dict(zip(map(tuple, map(sorted, zip(c.instance_a, c.instance_b))), c.distance)) for c in (a, b))
     assert len(a) > 50 and a == pytest.approx(b, abs=1e-8)
     # Single precision is near enough.

@@ -95,12 +95,9 @@ pub struct Args {
     /// Maximum number of contacts of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
-    /// Find the K deepest contacts of the pair only. They may all be at one place
-    #[arg(long, value_name = "K", conflicts_with = "reduce")]
-    pub deepest: Option<u32>,
     /// Find at most K contacts of the pair only, spread over the places that touch. The time
     /// follows K. The deepest contact may be missing
-    #[arg(long, value_name = "K", conflicts_with_all = ["reduce", "deepest"])]
+    #[arg(long, value_name = "K", conflicts_with = "reduce")]
     pub spread: Option<u32>,
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = device::help("contacts are found"))]
@@ -182,11 +179,7 @@ impl Args {
             tolerance,
             contact_distance: self.contact_distance,
             cos_theta: self.cos_theta.0,
-            reduction: match (self.deepest, self.spread) {
-                (Some(k), _) => Reduction::Deepest(k),
-                (None, Some(k)) => Reduction::Spread(k),
-                (None, None) => self.reduce,
-            },
+            reduction: self.spread.map_or(self.reduce, Reduction::Spread),
             ..CollideOptions::default()
         }
     }

@@ -73,13 +73,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 // What all features use together, some of them leave alone.
 #![cfg_attr(
-    not(all(
-        feature = "collide",
-        feature = "gltf",
-        feature = "gmsh",
-        feature = "parallel",
-        feature = "vtu"
-    )),
+    not(all(feature = "collide", feature = "gltf", feature = "gmsh", feature = "parallel")),
     allow(dead_code, unused_imports)
 )]
 

@@ -45,11 +45,8 @@ pub struct Args {
     /// Keep at most N contacts per pair of bodies
     #[arg(long, value_name = "N")]
     pub reduce: Option<u32>,
-    /// Find the K deepest contacts per pair of bodies only
-    #[arg(long, value_name = "K", conflicts_with = "reduce")]
-    pub deepest: Option<u32>,
     /// Find at most K contacts per pair of bodies only, spread over the places that touch
-    #[arg(long, value_name = "K", conflicts_with_all = ["reduce", "deepest"])]
+    #[arg(long, value_name = "K", conflicts_with = "reduce")]
     pub spread: Option<u32>,
     /// Number of copies of the scene, each in its own world
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -24,11 +24,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         contacts_per: args.contacts_per,
         iterations: args.iterations,
         cos_theta: Some(args.cos_theta),
-        reduction: match (args.reduce, args.deepest, args.spread) {
-            (Some(n), ..) => Reduction::PerPair(n),
-            (_, Some(k), _) => Reduction::Deepest(k),
-            (.., Some(k)) => Reduction::Spread(k),
-            (None, None, None) => Reduction::None,
+        reduction: match (args.reduce, args.spread) {
+            (Some(n), _) => Reduction::PerPair(n),
+            (None, Some(k)) => Reduction::Spread(k),
+            (None, None) => Reduction::None,
         },
         ..CollideOptions::with_mode(args.mode.into())
     };

@@ -11,7 +11,7 @@ use tesdf_terminal::parse;
 #[derive(clap::Args, Debug)]
 pub struct ChoiceArgs {
     /// Division of the space in and around the solid into tetrahedra: `bisection` needs no other
-    /// program, `gmsh` runs Gmsh, and a FILE (.msh, .node, .ele, .vtu) has tetrahedra that conform
+    /// program, `gmsh` runs Gmsh, and a FILE (.msh, .node, .ele) has tetrahedra that conform
     /// to the mesh's faces
     #[arg(long, value_name = "bisection|gmsh|FILE", default_value = "bisection")]
     pub domain: DomainChoice,

@@ -7,6 +7,7 @@ mod counts;
 mod middle;
 mod narrow;
 mod on_device;
+mod on_processor;
 mod options;
 mod pass;
 pub mod queries;
@@ -20,14 +21,15 @@ use std::collections::BTreeMap;
 use tesdf::Length;
 use tesdf::collide::internal::in_cones;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, Mode, Reduction, Scene, Shape,
-    ShapeId, Statistics, reduce_pairs,
+    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, InstancePair, Mode, Reduction, Scene,
+    Shape, ShapeId, Statistics, reduce_pairs,
 };
 
 use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
 use contacts::{Row, Words, contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
 pub use on_device::{DeviceContacts, GivenPoses};
+use on_processor::{Divided, with_pairs};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
@@ -89,6 +91,11 @@ impl Detector {
     /// # Errors
     /// The errors of [`new`](Self::new).
     pub fn upload(&mut self, scene: &Scene) -> Result<(), GpuError> {
+        self.upload_shapes(&Divided::new(scene)?.on_device)
+    }
+
+    /// Uploads the shapes of a scene whose contacts kernels find.
+    fn upload_shapes(&mut self, scene: &Scene) -> Result<(), GpuError> {
         let ids = shape_ids(scene);
         let shapes: Vec<Shape> = ids.iter().map(|&id| scene.shape(id).cloned()).collect::<Result<_, _>>()?;
         self.shapes = GpuShapes::upload(&self.device, &shapes)?;
@@ -121,12 +128,12 @@ impl Detector {
     ///   gradients of the signed distance.
     /// - Contacts of nodes are reduced on the device. This follows the rules of the processor, but
     ///   compares bounds of distances instead of distances. So it may keep other contacts.
-    /// - Contacts of faces are reduced on the processor, because the loss depends on their normals;
-    ///   so are those of [`Reduction::Deepest`]. This saves no time here. [`Reduction::Spread`] is
-    ///   [`Reduction::PerPair`] here.
-    /// - In the field of an open mesh under the rule
-    ///   [`Generalized`](tesdf::base::InsideRule::Generalized), a search along a jump needs more
-    ///   rounds than elsewhere. It ends after the same number, and says `converged: false` sooner.
+    /// - Contacts of faces are reduced on the processor, because the loss depends on their normals.
+    ///   This saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
+    /// - Kernels do not detect open meshes under the rule
+    ///   [`Generalized`](tesdf::base::InsideRule::Generalized), nor meshes with faces that look
+    ///   inwards in places. The processor finds all contacts of their instances, in `f64`.
+    ///   [`DeviceReport::pairs_on_processor`] counts these pairs.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
@@ -173,6 +180,38 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         let options = &possible(options)?;
+        let (divided, pairs) = self.divide(scene, options)?;
+        let found = self.run_on_device(&divided.on_device, options, timing)?;
+        self.report.pairs_on_processor = pairs.len();
+        Ok(with_pairs(found, &pairs, scene, options)?)
+    }
+
+    /// Divides the instances of a scene by where contacts are found, and returns the pairs that the
+    /// processor detects.
+    fn divide<'a>(
+        &self,
+        scene: &'a Scene,
+        options: &CollideOptions,
+    ) -> Result<(Divided<'a>, Vec<InstancePair>), GpuError> {
+        let divided = Divided::new(scene)?;
+        let pairs = divided.pairs(scene, options)?;
+        if !pairs.is_empty() && self.shapes.have_moved() {
+            return Err(GpuError::Unavailable {
+                what: "contacts of open meshes and of faces with the inside in front of them, while vertices have moved on \
+                       the device"
+                    .into(),
+                instead: "move the vertices of the scene, and upload it",
+            });
+        }
+        Ok((divided, pairs))
+    }
+
+    fn run_on_device(
+        &mut self,
+        scene: &Scene,
+        options: &CollideOptions,
+        timing: Timing,
+    ) -> Result<Contacts, GpuError> {
         let reduction = options.reduction;
         if wants_minima(options) && self.shapes.have_moved() {
             return Err(GpuError::Unavailable {
@@ -180,18 +219,14 @@ impl Detector {
                 instead: "ask for contacts per face",
             });
         }
-        // These are known on the processor only.
-        let of_processor = matches!(reduction, Reduction::Deepest(_)) || self.has_cones(options);
-        if reduction == Reduction::None || !of_processor {
+        // Cones are known on the processor only.
+        if reduction == Reduction::None || !self.has_cones(options) {
             return self.find(scene, options, timing);
         }
         let all = self.find(scene, &CollideOptions { reduction: Reduction::None, ..*options }, timing)?;
         let (mut statistics, hidden) = (all.statistics, all.hidden.clone());
         let (contacts, reductions) = reduce_pairs(all.into_vec(), options.reduction);
         statistics.reduced = statistics.touching - statistics.filtered - contacts.len();
-        if matches!(reduction, Reduction::Deepest(_)) {
-            statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
-        }
         Ok(Contacts::new(contacts, statistics, reductions, hidden))
     }
 
@@ -222,7 +257,7 @@ impl Detector {
                     instead: "upload the scene, and move its vertices again",
                 });
             }
-            self.upload(scene)?;
+            self.upload_shapes(scene)?;
         }
         // The processor's tree knows neither vertices nor instances that have moved on the device.
         let on_processor = !self.shapes.have_moved() && given.is_none();
@@ -309,7 +344,7 @@ impl Detector {
         let reductions = self.reductions(instances, options.reduction)?;
         let (found, unconverged) = match options.reduction {
             Reduction::PerPair(_) => (counts.contacts as usize, counts.unconverged as usize),
-            Reduction::None | Reduction::Deepest(_) | Reduction::Spread(_) => {
+            Reduction::None | Reduction::Spread(_) => {
                 (contacts.len(), contacts.iter().filter(|c| !c.converged).count())
             }
         };

@@ -12,23 +12,12 @@ use crate::kernels::narrow::exchange::{LANES, Variant};
 use crate::kernels::narrow::faces::AskedLaunch;
 use crate::kernels::narrow::{exact, exact_faces, faces, nodes, whole_faces};
 
-/// The fields that the exact mode searches.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Fields {
-    All,
-    /// Those of open meshes, for the mode `face`.
-    Open,
-}
-
 impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
         match self.options.mode {
             Mode::Node => self.narrow_nodes(),
-            Mode::Face => {
-                self.narrow_faces()?;
-                if self.detector.shapes.rules.jumps { self.narrow_exact(Fields::Open) } else { Ok(()) }
-            }
-            Mode::Exact => self.narrow_exact(Fields::All),
+            Mode::Face => self.narrow_faces(),
+            Mode::Exact => self.narrow_exact(),
         }
     }
 
@@ -104,13 +93,12 @@ impl Pass<'_> {
         )
     }
 
-    fn narrow_exact(&mut self, fields: Fields) -> Result<(), GpuError> {
+    fn narrow_exact(&mut self) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let per_polygon = self.groups_for(buffers.room.polygons, 1, POLYGONS)?;
         let tolerances = self.tolerances()?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
-        let asked =
-            AskedExactLaunch::new(tolerances.words(), self.cos_theta(), u32::from(fields == Fields::Open));
+        let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
         let counting = self.detector.options.counting == Counting::Operations;
         if parts(self.options) == Parts::Faces {
             let faces = buffers.whole_faces();

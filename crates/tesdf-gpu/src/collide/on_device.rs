@@ -1,10 +1,14 @@
 //! Contacts that stay on the device, for a physics engine on the same device. Poses may come from an
 //! array there, too.
-use glam::Vec3;
+use glam::{DQuat, DVec3, Vec3};
 use tesdf::collide::internal::Ahead;
-use tesdf::collide::{CollideError, CollideOptions, HiddenOverlap, InstanceId, Reduction, Scene, Shape};
+use tesdf::collide::{
+    CollideError, CollideOptions, HiddenOverlap, Instance, InstanceId, Pose, Reduction, Scene, Shape,
+    Velocity,
+};
 
 use super::contacts::contacts;
+use super::on_processor::{has_undetected, with_pairs_on_device};
 use super::pass::{GROUP, Parts, Pass, parts};
 use super::scene::instances::Instances;
 use super::scene::placed::Placed;
@@ -89,33 +93,75 @@ impl GivenPoses<'_> {
         self.velocities.map_or(Ok(()), |velocities| check("velocities", velocities.len(), VELOCITY))
     }
 
-    /// The error of the first instance with a pose or velocity that is none.
-    pub(super) fn first_bad(&self, device: &Device, instances: &Instances) -> Result<GpuError, GpuError> {
+    /// The rows of the arrays.
+    fn rows(&self, device: &Device) -> Result<Vec<GivenRow>, GpuError> {
         let poses = self.poses.read(device)?;
         let velocities = self.velocities.map(|all| all.read(device)).transpose()?.unwrap_or_default();
+        let mut velocities = velocities.as_chunks().0.iter();
+        let row =
+            |pose: &[f32; POSE as usize]| GivenRow { pose: *pose, velocity: velocities.next().copied() };
+        Ok(poses.as_chunks().0.iter().map(row).collect())
+    }
+
+    /// The error of the first instance with a pose or velocity that is none.
+    pub(super) fn first_bad(&self, device: &Device, instances: &Instances) -> Result<GpuError, GpuError> {
         let mut ids = instances.ids.clone();
         ids.sort_unstable();
-        let mut still = std::iter::repeat(&[][..]);
-        let mut moving = velocities.chunks_exact(VELOCITY as usize);
-        let velocities: &mut dyn Iterator<Item = &[f32]> =
-            if velocities.is_empty() { &mut still } else { &mut moving };
-        let bad = ids.iter().zip(poses.chunks_exact(POSE as usize)).zip(velocities).find_map(|((id, p), v)| {
-            let length = Vec3::from_slice(&p[3..6]).extend(p[6]).length();
-            let is_pose = p[..3].iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= UNIT_LENGTH;
-            let is_good = is_pose && v.iter().all(|x| x.is_finite());
-            (!is_good).then(|| GpuError::Instance {
-                instance: id.0 as usize,
-                reason: format!(
-                    "the arrays place it at {p:?} with the velocity {v:?}; expected finite numbers, and a quaternion of \
-                     length 1, up to {UNIT_LENGTH:e}"
-                ),
-            })
-        });
+        let rows = self.rows(device)?;
+        let bad = ids.iter().zip(&rows).find_map(|(id, row)| row.check(*id).err());
         // The kernel's numbers may be rounded otherwise.
         Ok(bad.unwrap_or_else(|| GpuError::Instance {
             instance: ids.first().map_or(0, |id| id.0 as usize),
             reason: "an array has a pose that is none; normalise the quaternions".into(),
         }))
+    }
+
+    /// A scene with its instances where the arrays have them.
+    fn placed(&self, device: &Device, scene: &Scene) -> Result<Scene, GpuError> {
+        let rows = self.rows(device)?;
+        let place = |((id, instance), row): ((InstanceId, &Instance), &GivenRow)| {
+            row.check(id)?;
+            Ok((id, Instance { pose: row.pose(), velocity: row.velocity(), ..*instance }))
+        };
+        let updates = scene.instances().zip(&rows).map(place).collect::<Result<Vec<_>, GpuError>>()?;
+        let mut placed = scene.clone();
+        placed.update(&updates)?;
+        Ok(placed)
+    }
+}
+
+/// A row of [`GivenPoses`].
+struct GivenRow {
+    pose: [f32; POSE as usize],
+    velocity: Option<[f32; VELOCITY as usize]>,
+}
+
+impl GivenRow {
+    fn check(&self, id: InstanceId) -> Result<(), GpuError> {
+        let Self { pose, velocity } = self;
+        let velocity = velocity.as_ref().map_or(&[][..], |v| v);
+        let length = Vec3::from_slice(&pose[3..6]).extend(pose[6]).length();
+        let is_pose = pose[..3].iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= UNIT_LENGTH;
+        if is_pose && velocity.iter().all(|x| x.is_finite()) {
+            return Ok(());
+        }
+        Err(GpuError::Instance {
+            instance: id.0 as usize,
+            reason: format!(
+                "the arrays place it at {pose:?} with the velocity {velocity:?}; expected finite numbers, and a \
+                 quaternion of length 1, up to {UNIT_LENGTH:e}"
+            ),
+        })
+    }
+
+    fn pose(&self) -> Pose {
+        let [x, y, z, qx, qy, qz, qw] = self.pose.map(f64::from);
+        Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(qx, qy, qz, qw).normalize() }
+    }
+
+    fn velocity(&self) -> Velocity {
+        let [x, y, z, a, b, c] = self.velocity.unwrap_or_default().map(f64::from);
+        Velocity { linear: DVec3::new(x, y, z), angular: DVec3::new(a, b, c) }
     }
 }
 
@@ -168,6 +214,9 @@ impl Detector {
     /// poses, the instances of the scene are there instead of at their own poses. Only counters are
     /// read back. The arrays are complete when the call returns, so every stream may read them.
     ///
+    /// Where a scene has shapes whose contacts the processor finds (see [`detect`](Self::detect)),
+    /// poses and contacts are copied to it and back.
+    ///
     /// Everything is rounded to `f32`, points and poses of the world too. The same input gives the
     /// same bytes on the same device.
     ///
@@ -175,8 +224,8 @@ impl Detector {
     /// The errors of [`detect`](Self::detect), and
     /// - [`GpuError::Length`] when an array does not have a row for each instance;
     /// - [`GpuError::Instance`] for a pose that is none, or a velocity that is not finite;
-    /// - [`GpuError::Unavailable`] for what only the processor does: contacts per minimum, one
-    ///   contact of all faces at a vertex, and [`Reduction::Deepest`].
+    /// - [`GpuError::Unavailable`] for what only the processor does: contacts per minimum, and
+    ///   one contact of all faces at a vertex.
     pub fn detect_on_device(
         &mut self,
         scene: &Scene,
@@ -185,9 +234,7 @@ impl Detector {
     ) -> Result<DeviceContacts, GpuError> {
         let options = &possible(options)?;
         let reduces = matches!(options.reduction, Reduction::PerPair(_));
-        let of_processor = if matches!(options.reduction, Reduction::Deepest(_)) {
-            Some(("the deepest contacts", "ask for reduced contacts"))
-        } else if wants_minima(options) {
+        let of_processor = if wants_minima(options) {
             Some(("contacts per minimum", "ask for contacts per cell, or reduced contacts per face"))
         } else if parts(options) == Parts::Faces && !reduces {
             Some((
@@ -203,6 +250,28 @@ impl Detector {
         if let Some(given) = given {
             given.check(scene.instances().len())?;
         }
+        let placed;
+        let (scene, given) = match given {
+            // The processor needs them.
+            Some(given) if has_undetected(scene) => {
+                placed = given.placed(&self.device, scene)?;
+                (&placed, None)
+            }
+            given => (scene, given),
+        };
+        let (divided, pairs) = self.divide(scene, options)?;
+        let found = self.leave(&divided.on_device, given, options)?;
+        self.report.pairs_on_processor = pairs.len();
+        with_pairs_on_device(found, &pairs, scene, options, &self.device)
+    }
+
+    /// Finds the contacts of a scene without instances that only the processor detects.
+    fn leave(
+        &mut self,
+        scene: &Scene,
+        given: Option<&GivenPoses<'_>>,
+        options: &CollideOptions,
+    ) -> Result<DeviceContacts, GpuError> {
         let (instances, placed) = self.passes(scene, given, options, Timing::Off)?;
         let found = self.in_world(&instances, &placed, options)?;
         let hidden = self.overlaps(&instances)?;

@@ -137,6 +137,9 @@ pub struct DeviceReport {
     pub sent: usize,
     /// Bytes that were read from the device, in all passes.
     pub read: usize,
+    /// Number of pairs of instances whose contacts the processor has found, because kernels do not
+    /// detect a shape.
+    pub pairs_on_processor: usize,
     /// Counts of the last pass.
     pub counts: Counts,
     /// Name and device time of each launch of the last pass, in order. Empty except after

@@ -126,9 +126,8 @@ fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
 
 /// Adds the kernels of the narrow phase.
 fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
-    let exact = || AskedExactLaunch::new(words(), 0.0, 0);
+    let exact = || AskedExactLaunch::new(words(), 0.0);
     let at_points = Rules { at_points: true, ..Rules::default() };
-    let all_rules = Rules { at_points: true, jumps: true, turned: true };
     let asked = || AskedLaunch::new(words(), 1, 0.0);
     let in_world = || WorldContactsLaunch::new(words(), words(), words(), words(), words());
     kernels!(all, device, target;
@@ -146,8 +145,6 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), true); "counting";;
         Indirect narrow::exact_faces::narrow_exact_faces, LANES,
             (shapes_with(at_points), pairs(), polygons(), counters(), contacts(), exact(), false); "with rules";;
-        Indirect narrow::exact_faces::narrow_exact_faces, LANES,
-            (shapes_with(all_rules), pairs(), polygons(), counters(), contacts(), exact(), false); "with all rules";;
     );
     for counting in [false, true] {
         for lanes in [LANES, 1] {

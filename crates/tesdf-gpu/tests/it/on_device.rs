@@ -4,11 +4,16 @@ use std::collections::BTreeMap;
 
 use crate::compare::device;
 use crate::support::bodies::{Relation, body, rotation};
+use crate::support::parts::Parts;
+use crate::support::parts::Turn::Outward;
 use crate::support::random::Random;
+use tesdf::base::InsideRule;
 use tesdf::collide::{
     CollideOptions, Contact, ContactsPer, Instance, InstanceId, Mode, Pose, Reduction, Scene, Shape, Velocity,
 };
+use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3, Vec3};
+use tesdf::mesh::SolidMesh;
 use tesdf_gpu::{Detector, DetectorOptions, Device, DeviceArray, DeviceContacts, GivenPoses, GpuError};
 
 pub fn detector(scene: &Scene) -> Detector {
@@ -280,6 +285,73 @@ fn poses_come_from_arrays() {
     assert_eq!(found.count, counts[0]);
 }
 
+/// An open mesh and overlapping solids under `odd` in each world, among bodies that kernels detect.
+fn worlds_with_rules(random: &mut Random) -> Scene {
+    let mut scene = worlds(2, random);
+    let middles: Vec<(u32, DVec3)> =
+        scene.instances().step_by(3).map(|(_, i)| (i.world, i.pose.translation)).collect();
+    let cube = |parts: Parts, at: f64| parts.cube(DVec3::splat(at), 1.0, Outward);
+    let open = Parts::default().open_cube(DVec3::splat(-0.5), 1.0, Outward);
+    let overlap = cube(cube(Parts::default(), -0.5), -0.1);
+    for (parts, rule) in [(open, InsideRule::Generalized), (overlap, InsideRule::Odd)] {
+        let solid = SolidMesh::with_inside(parts.turned().mesh(), rule.into()).expect("a solid");
+        let asset = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
+        let shape = scene.add_shape(asset).expect("a shape");
+        for &(world, middle) in &middles {
+            let pose = Pose { translation: middle + 0.5 * random.in_cube(), rotation: rotation(random) };
+            let velocity = Velocity { linear: 0.01 * random.in_cube(), angular: 0.01 * random.in_cube() };
+            let instance = Instance { world, velocity, ..Instance::new(shape, pose) };
+            scene.add(instance).expect("an instance");
+        }
+    }
+    scene
+}
+
+/// The scene with poses and velocities that `f32` can hold.
+fn rounded(scene: &Scene) -> Scene {
+    let mut moved = scene.clone();
+    let round = |v: DVec3| v.as_vec3().as_dvec3();
+    let rounded = |(id, &i): (InstanceId, &Instance)| {
+        let rotation = i.pose.rotation.as_quat().as_dquat().normalize();
+        let pose = Pose { translation: round(i.pose.translation), rotation };
+        let velocity = Velocity { linear: round(i.velocity.linear), angular: round(i.velocity.angular) };
+        (id, Instance { pose, velocity, ..i })
+    };
+    let updates: Vec<(InstanceId, Instance)> = scene.instances().map(rounded).collect();
+    moved.update(&updates).expect("poses");
+    moved
+}
+
+#[test]
+fn contacts_of_the_processor_join_those_of_the_device() {
+    let scene = rounded(&worlds_with_rules(&mut Random(9)));
+    let mut detector = detector(&scene);
+    let device = detector.device().clone();
+    let (poses, velocities) = arrays(&device, &scene);
+    let given = GivenPoses { poses: &poses, velocities: Some(&velocities) };
+    let stale = elsewhere(&scene);
+    let forms = each_form();
+    let ahead = CollideOptions { speculative_time: 2.0, ..forms[0] };
+    for options in [forms[0], ahead, forms[2]] {
+        let expected = detector.detect(&scene, &options).expect("detects");
+        let found = detector.detect_on_device(&scene, None, &options).expect("detects");
+        let pairs = detector.report().pairs_on_processor;
+        assert!((10..20).contains(&pairs) && expected.len() > 50, "{pairs} pairs, {}", expected.len());
+        let rows = read(&device, &found);
+        are_equal(&rows, expected.as_slice(), 2.0, 1e-6, Normals::of(&options));
+        assert_eq!(found.hidden, expected.hidden);
+        let elsewhere = detector.detect_on_device(&stale, Some(&given), &options).expect("detects");
+        assert_eq!(read(&device, &elsewhere), rows);
+        assert_eq!(elsewhere.hidden, found.hidden);
+    }
+    let mut bad = poses.read(&device).expect("numbers");
+    bad[7 + 6] += 0.1;
+    let bad = DeviceArray::upload(&device, &bad).expect("fits");
+    let given = GivenPoses { poses: &bad, velocities: None };
+    let error = detector.detect_on_device(&stale, Some(&given), &forms[0]).err().expect("no pose");
+    assert!(matches!(error, GpuError::Instance { instance: 1, .. }), "{error}");
+}
+
 #[test]
 fn overlaps_without_a_contact_are_reported() {
     let mut scene = Scene::new();
@@ -372,7 +444,6 @@ fn what_only_the_processor_does_is_an_error() {
             "leaving one contact of all faces at a vertex there",
         ),
         (of(Mode::Exact, ContactsPer::Minimum, Reduction::None), "leaving contacts per minimum there"),
-        (of(Mode::Node, ContactsPer::Face, Reduction::Deepest(4)), "leaving the deepest contacts there"),
     ] {
         let error =
             detector.detect_on_device(&scene, None, &options).map(|found| found.count).expect_err("refused");

@@ -14,7 +14,7 @@ fn forms() -> Vec<CollideOptions> {
     let more = [
         CollideOptions { contacts_per: ContactsPer::Face, ..of(Mode::Face) },
         CollideOptions { cos_theta: Some(0.3), ..of(Mode::Face) },
-        CollideOptions { reduction: Reduction::Deepest(3), ..of(Mode::Exact) },
+        CollideOptions { reduction: Reduction::PerPair(3), ..of(Mode::Exact) },
     ];
     [each_form(), more.to_vec()].concat()
 }

@@ -268,32 +268,6 @@ fn contacts_at_one_point() {
     }
 }
 
-/// The processor cuts the contacts that the device has found.
-#[test]
-fn the_deepest_contacts_are_those_of_all_that_the_device_finds() {
-    let mut random = Random(12);
-    let scene = worlds(3, &mut random);
-    for mode in [Mode::Node, Mode::Exact] {
-        let options = CollideOptions {
-            contact_distance: 1e-3,
-            contacts_per: tesdf::collide::ContactsPer::Face,
-            ..CollideOptions::with_mode(mode)
-        };
-        let (all, mut detector) = detected(&scene, &options, DetectorOptions::default());
-        for count in [1, 6, 1000] {
-            let reduction = Reduction::Deepest(count);
-            let few = detector.detect(&scene, &CollideOptions { reduction, ..options }).expect("detects");
-            let (expected, reports) = reduce_pairs(all.as_slice().to_vec(), reduction);
-            assert_eq!((few.as_slice(), &few.reductions), (expected.as_slice(), &reports));
-            assert_eq!(few.hidden, all.hidden);
-            let s = few.statistics;
-            assert_eq!((s.touching, s.reduced), (all.statistics.touching, all.len() - few.len()));
-            let most = reports.iter().map(|r| r.kept).max().expect("pairs that touch");
-            assert!(most > 0 && most <= count as usize);
-        }
-    }
-}
-
 #[test]
 fn scenes_without_contacts_have_no_reductions() {
     let mut random = Random(1);

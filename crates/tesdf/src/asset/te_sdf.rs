@@ -227,6 +227,13 @@ impl TeSdf {
         })
     }
 
+    /// Whether kernels on other devices find contacts of the asset: its field does not jump, and no
+    /// face has the inside in front of it.
+    #[doc(hidden)]
+    pub fn is_detected_on_devices(&self) -> bool {
+        self.jump().is_none() && self.faces_look_outward()
+    }
+
     /// Bounds of the solid, in the unit of the mesh: those of the mesh, with half of the thickness
     /// of a sheet around them. The inside of an open mesh can extend farther beyond them.
     pub(crate) fn bounds_of_solid(&self) -> Aabb {

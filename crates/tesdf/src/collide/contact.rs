@@ -70,7 +70,7 @@ pub struct Statistics {
     /// Ordered pairs of instances whose bounds overlap.
     pub instance_pairs: usize,
     /// Faces or nodes of a that remain after the broad phase, over all pairs. With
-    /// [`Deepest`](super::Reduction::Deepest), this and all other numbers count what was looked at.
+    /// [`Spread`](super::Reduction::Spread), this and all other numbers count what was looked at.
     pub candidates: usize,
     /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell.
     /// With one contact per face: faces.
@@ -100,8 +100,7 @@ pub struct PairReduction {
     /// The instance with the higher id.
     pub instance_b: InstanceId,
     /// Number of contacts of the pair before the reduction, in both orders. With
-    /// [`Deepest`](super::Reduction::Deepest) and [`Spread`](super::Reduction::Spread), number of
-    /// contacts that were found.
+    /// [`Spread`](super::Reduction::Spread), number of contacts that were found.
     pub contacts: usize,
     /// Number of kept contacts.
     pub kept: usize,

@@ -9,7 +9,7 @@ use super::reduce::{Reduced, reduced};
 use super::surface::Candidates;
 use super::{
     CollideError, CollideOptions, Contact, Contacts, ContactsPer, InstanceId, InstancePair, InstancePairs,
-    Reduction, Scene, Statistics, deepest, few, hidden, spread,
+    Reduction, Scene, Statistics, hidden, spread,
 };
 
 /// Number of faces or nodes per task.
@@ -55,7 +55,7 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
 }
 
 /// As [`detect`], until another thread sets `stop`. What is being computed then is completed: some
-/// faces, or with [`Reduction::Deepest`] and [`Reduction::Spread`] a pair of instances.
+/// faces, or with [`Reduction::Spread`] a pair of instances.
 ///
 /// # Errors
 /// As [`detect`], and [`CollideError::Stopped`].
@@ -150,14 +150,8 @@ fn of_pairs_by(
     is_small: bool,
 ) -> Contacts {
     let stopped = || stop.load(Ordering::Relaxed);
-    match options.reduction {
-        Reduction::Deepest(n) => {
-            return few::of_pairs(pairs, options, stop, |pair| deepest::of_pair(pair, n as usize));
-        }
-        Reduction::Spread(n) => {
-            return few::of_pairs(pairs, options, stop, |pair| spread::of_pair(pair, n as usize));
-        }
-        Reduction::None | Reduction::PerPair(_) => {}
+    if let Reduction::Spread(n) = options.reduction {
+        return spread::of_pairs(pairs, options, stop, n as usize);
     }
     let candidates_of = |pair: &OrderedPair| if stopped() { Candidates::new() } else { pair.candidates() };
     let candidates: Vec<Candidates> = match is_small {

@@ -13,7 +13,7 @@
 //!   [`detect_with`], which finds the same contacts.
 //! - [`candidates`](candidates()): the result of the broad and the middle phase, for debug views.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound of the loss; [`wrench_error`] computes
-//!   the loss. [`Reduction::Deepest`] and [`Reduction::Spread`] do not find all contacts.
+//!   the loss. [`Reduction::Spread`] does not find all contacts.
 //! - [`PatchTracker`]: contacts grouped into patches, which keep their ids from step to step.
 //! - [`hidden_overlaps`]: pairs that overlap without a contact that shows it. Detections report
 //!   them beside the contacts.
@@ -34,13 +34,11 @@ mod clearance;
 mod coarse;
 mod cones;
 mod contact;
-mod deepest;
 mod deepest_penetration;
 mod depth_bounds;
 mod descent;
 mod detect;
 mod error;
-mod few;
 mod field;
 mod field_value;
 mod first_touch;

@@ -10,7 +10,7 @@ use crate::query::Precision;
 pub enum Mode {
     /// Node-TES: the vertices.
     Node,
-    /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9). A fixed number of
+    /// Face-TES: the least signed distance over each face (Eq. 9). A fixed number of
     /// Frank–Wolfe [`iterations`](CollideOptions::iterations) gives an upper bound of the minimum.
     /// In the field of an open mesh, whose signed distance jumps, it searches as
     /// [`Exact`](Self::Exact).
@@ -57,11 +57,6 @@ pub enum Reduction {
     /// At most this many per pair of instances: the deepest, the extremes, then those that matter
     /// most for the wrench.
     PerPair(u32),
-    /// The deepest contacts, at most this many per pair of instances. They are exactly the deepest
-    /// of all contacts; of equally deep ones, the first in the order of a detection. The search is
-    /// best-first and does not find the other contacts. All deepest contacts may be at one place,
-    /// so they can hold a body worse than as many contacts of [`PerPair`](Self::PerPair).
-    Deepest(u32),
     /// At most this many contacts per pair of instances, spread over the places that touch. The
     /// surfaces are divided into as many regions, and the deepest contact that a dive into each
     /// region finds is kept. The time follows this number, not the number of faces that touch. The
@@ -84,14 +79,14 @@ pub enum HiddenSearch {
     Off,
 }
 
-/// Options of a detection.
+/// Options of a detection. What a text leaves out has its default.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct CollideOptions {
     /// Nodes or faces, and the method.
     pub mode: Mode,
     /// One contact for each cell that a face meets, for each face, or for each local minimum. Not
     /// used for nodes.
-    #[serde(default = "per_cell")]
     pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations of the mode [`Face`](Mode::Face), at most
     /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). Each evaluates the field once. The paper uses 16.
@@ -114,19 +109,10 @@ pub struct CollideOptions {
     /// Number of contacts kept per pair of instances.
     pub reduction: Reduction,
     /// Whether overlaps are searched for that no contact shows. Changes no contact.
-    #[serde(default)]
     pub hidden: HiddenSearch,
     /// Precision of the reported distances, normals and witness points.
-    #[serde(skip, default = "exact")]
+    #[serde(skip)]
     pub precision: Precision,
-}
-
-fn per_cell() -> ContactsPer {
-    ContactsPer::Cell
-}
-
-fn exact() -> Precision {
-    Precision::F64
 }
 
 impl CollideOptions {
@@ -170,7 +156,7 @@ impl CollideOptions {
                 "at most 65536: from some hundred on nothing is gained",
             );
         }
-        if matches!(self.reduction, Reduction::PerPair(0) | Reduction::Deepest(0) | Reduction::Spread(0)) {
+        if matches!(self.reduction, Reduction::PerPair(0) | Reduction::Spread(0)) {
             return refuse("reduction", "0 contacts per pair".into(), "at least 1, or none");
         }
         Ok(())

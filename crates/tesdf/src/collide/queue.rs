@@ -38,10 +38,6 @@ impl<T> Queue<T> {
         self.heap.len()
     }
 
-    pub fn clear(&mut self) {
-        self.heap.clear();
-    }
-
     /// The items that are left, not sorted.
     pub fn into_items(self) -> impl Iterator<Item = T> {
         self.heap.into_iter().map(|entry| entry.item)

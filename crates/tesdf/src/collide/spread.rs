@@ -9,13 +9,18 @@
 //!
 //! Every node that was passed has a lower bound of the distances of its contacts. The least of
 //! these bounds says how deep a contact can be that was not found.
-use super::few::{OfPair, unfound};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::DVec3;
+
+use super::field::ROUNDING;
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;
 use super::queue::Queue;
-use super::reduce::{deepest_of_pair, report_of_kept, split_deepest};
-use super::{Contact, Statistics};
+use super::reduce::{Unfound, report_of_kept};
+use super::{CollideOptions, Contact, Contacts, PairReduction, Statistics, hidden};
 use crate::asset::layout::TreeChild;
+use crate::geometry::Aabb;
 use crate::parallel::*;
 
 /// Number of leaves after which a dive without a contact ends.
@@ -43,8 +48,52 @@ struct Dive {
     left: f64,
 }
 
+/// The contacts of a pair that are kept.
+#[derive(Default)]
+struct OfPair {
+    /// The contacts, in the order of a detection.
+    contacts: Vec<Contact>,
+    /// Where there is a contact.
+    report: Option<PairReduction>,
+    /// What was looked at and found.
+    statistics: Statistics,
+}
+
+/// At most `count` contacts of each pair of instances. The two orders of a pair must be adjacent. Once
+/// `stop` is set, contacts are missing.
+pub fn of_pairs(
+    pairs: &[OrderedPair],
+    options: &CollideOptions,
+    stop: &AtomicBool,
+    count: usize,
+) -> Contacts {
+    let of_pair = |pair: &[OrderedPair]| match stop.load(Ordering::Relaxed) {
+        true => OfPair::default(),
+        false => of_pair(pair, count),
+    };
+    let found: Vec<OfPair> = pairs.par_chunks(2).map(of_pair).collect();
+    let mut all = Vec::with_capacity(found.iter().map(|f| f.contacts.len()).sum());
+    let mut reports = Vec::new();
+    let mut statistics = Statistics { instance_pairs: pairs.len(), ..Statistics::default() };
+    for OfPair { contacts, report, statistics: own } in found {
+        statistics.candidates += own.candidates;
+        statistics.polygons += own.polygons;
+        statistics.touching += own.touching;
+        statistics.filtered += own.filtered;
+        statistics.reduced += own.reduced;
+        statistics.unconverged += own.unconverged;
+        statistics.bytes += own.bytes;
+        all.extend(contacts);
+        reports.extend(report);
+    }
+    statistics.bytes += size_of_val(pairs) + size_of_val(all.as_slice());
+    reports.sort_unstable_by_key(|r| (r.instance_a, r.instance_b));
+    let hidden = hidden::among(pairs, options, &all, stop);
+    Contacts::new(all, statistics, reports, hidden)
+}
+
 /// At most `count` contacts of a pair, whose two orders are given.
-pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
+fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
     let count = count.max(1);
     let regions = regions(orders, count);
     let dives: Vec<Dive> = match regions.len() {
@@ -81,19 +130,33 @@ pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
     }
     let found = statistics.touching - statistics.filtered;
     if kept.len() > count {
-        // Each order has a region.
-        let (deepest, cut) = split_deepest(&kept, count);
-        left = cut.into_iter().map(|i| kept[i].distance).fold(left, f64::min);
+        // Each order has a region. Of equally deep contacts, the first stay.
+        let mut by_depth: Vec<usize> = (0..kept.len()).collect();
+        by_depth.sort_by(|&i, &j| kept[i].distance.total_cmp(&kept[j].distance));
+        let mut deepest = by_depth[..count].to_vec();
+        deepest.sort_unstable();
+        left = by_depth[count..].iter().map(|&i| kept[i].distance).fold(left, f64::min);
         kept = deepest.into_iter().map(|i| kept[i]).collect();
     }
     statistics.reduced = found - kept.len();
     statistics.unconverged = kept.iter().filter(|c| !c.converged).count();
     statistics.bytes = size_of_val(regions.as_slice()) + size_of_val(kept.as_slice());
-    let report = match left {
-        f64::INFINITY => deepest_of_pair(&kept, kept.len(), None).1,
-        _ => report_of_kept(&kept, found, unfound(&orders[0]), left),
-    };
+    let is_all = left == f64::INFINITY;
+    let report = report_of_kept(&kept, found, (!is_all).then(|| unfound(&orders[0], left)));
     OfPair { contacts: kept, report, statistics }
+}
+
+/// All points that both bodies can have within the contact distance, where contacts `above` a
+/// distance were not found.
+fn unfound(pair: &OrderedPair, above: f64) -> Unfound {
+    let OrderedPair { surface, field, search, .. } = pair;
+    let bounds = [field.bounds(), surface.bounds()];
+    // A plane is infinite.
+    let size = bounds.map(|b| b.extent().max_element()).into_iter().fold(f64::INFINITY, f64::min);
+    let [x, y] = bounds.map(|b| b.grown(search.reach.max(0.0) + ROUNDING * size));
+    let common = Aabb { min: x.min.max(y.min), max: x.max.min(y.max) };
+    let length = 0.5 * common.extent().max(DVec3::ZERO).length() * field.unit();
+    Unfound { center: field.to_world(common.center()), length, above }
 }
 
 /// The children of a node that can have contacts.

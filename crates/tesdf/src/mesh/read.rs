@@ -17,9 +17,6 @@ mod cad;
 mod error;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(not(feature = "gltf"))]
-#[path = "read/no_gltf.rs"]
-mod gltf;
 mod obj;
 mod off;
 mod ply;
@@ -27,9 +24,6 @@ mod sniff;
 mod stl;
 pub(crate) mod text;
 #[cfg(feature = "threemf")]
-mod threemf;
-#[cfg(not(feature = "threemf"))]
-#[path = "read/no_threemf.rs"]
 mod threemf;
 
 use std::ops::Range;
@@ -259,12 +253,12 @@ pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
 }
 
 fn files_of(path: &Path) -> Vec<PathBuf> {
-    let folder = path.parent().unwrap_or(Path::new(""));
     let buffers = match MeshFormat::of_path(path) {
         // A pipe is not opened here, because its bytes can be read only once.
+        #[cfg(feature = "gltf")]
         Ok(format @ (MeshFormat::Gltf | MeshFormat::Glb)) if path.is_file() => {
             let bytes = std::fs::read(path).unwrap_or_default();
-            gltf::external_files(&bytes, format, folder)
+            gltf::external_files(&bytes, format, path.parent().unwrap_or(Path::new("")))
         }
         _ => Vec::new(),
     };
@@ -325,12 +319,19 @@ fn parse(bytes: &[u8], format: MeshFormat, from: From<'_>) -> Result<LoadedMesh,
         MeshFormat::Obj => obj::parse(bytes),
         MeshFormat::Ply => ply::parse(bytes),
         MeshFormat::Off => off::parse(bytes),
+        #[cfg(feature = "gltf")]
         MeshFormat::Gltf | MeshFormat::Glb => gltf::parse(bytes, format, from.folder, &mut hasher),
+        #[cfg(feature = "threemf")]
         MeshFormat::ThreeMf => threemf::parse(bytes),
         MeshFormat::Step | MeshFormat::Iges | MeshFormat::Brep => match from.cad {
+            #[cfg(feature = "gmsh")]
             Some(options) => cad::parse(bytes, format, options),
-            None => return Err(ReadError::FileOnly { format }),
+            #[cfg(not(feature = "gmsh"))]
+            Some(_) => Err(ReadError::NotBuilt { format }),
+            None => Err(ReadError::FileOnly { format }),
         },
+        #[cfg(not(all(feature = "gltf", feature = "threemf")))]
+        format => Err(ReadError::NotBuilt { format }),
     }?;
     assemble(raw, format, hasher.finalize().to_hex().to_string())
 }

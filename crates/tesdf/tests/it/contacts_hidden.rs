@@ -54,7 +54,7 @@ fn deepest(found: &Contacts) -> f64 {
 fn without_the_search_contacts_are_the_same() {
     let scene = bodies(cube(), cube(), at(0.3, 0.0, 0.0));
     for mode in MODES {
-        for reduction in [Reduction::None, Reduction::Deepest(4), Reduction::Spread(4)] {
+        for reduction in [Reduction::None, Reduction::Spread(4)] {
             let on = CollideOptions { contact_distance: 1e-3, reduction, ..CollideOptions::with_mode(mode) };
             let off = CollideOptions { hidden: HiddenSearch::Off, ..on };
             let searched = detect(&scene, &on).expect("good");

@@ -204,7 +204,7 @@ fn each_part_looks_as_far_as_it_moves() {
             })
             .collect();
         let mode = [Mode::Node, Mode::Exact][case % 2];
-        let reduction = [Reduction::None, Reduction::Deepest(1000)][case / 2 % 2];
+        let reduction = [Reduction::None, Reduction::PerPair(1000)][case / 2 % 2];
         let options = CollideOptions {
             speculative_time: 0.2,
             contact_distance: 0.01,

@@ -108,6 +108,16 @@ fn invalid_options_are_refused() {
 }
 
 #[test]
+fn options_that_a_text_leaves_out_have_their_defaults() {
+    let read = |text| serde_json::from_str::<CollideOptions>(text).expect("options");
+    assert_eq!(read("{}"), CollideOptions::default());
+    let nodes = CollideOptions { mode: Mode::Node, contact_distance: 0.5, ..CollideOptions::default() };
+    assert_eq!(read(r#"{ "mode": "node", "contact_distance": 0.5 }"#), nodes);
+    let written = serde_json::to_string(&nodes).expect("a text");
+    assert_eq!(read(&written), nodes);
+}
+
+#[test]
 fn empty_scenes_single_bodies_and_two_planes_have_no_contacts() {
     let none = detect(&Scene::new(), &CollideOptions::default()).expect("nothing is no error");
     assert_eq!((none.len(), none.statistics.instance_pairs), (0, 0));
@@ -293,7 +303,7 @@ fn a_scaled_instance_equals_a_scaled_shape() {
 #[test]
 fn a_detection_can_be_stopped() {
     let (scene, _) = row(&[0.0, 1.5, 3.0]);
-    for reduction in [Reduction::None, Reduction::PerPair(1), Reduction::Deepest(1), Reduction::Spread(1)] {
+    for reduction in [Reduction::None, Reduction::PerPair(1), Reduction::Spread(1)] {
         let options = CollideOptions { reduction, ..CollideOptions::default() };
         assert_eq!(detect_until(&scene, &options, &AtomicBool::new(false)), detect(&scene, &options));
         let stopped = detect_until(&scene, &options, &AtomicBool::new(true));

@@ -106,14 +106,14 @@ impl Field<'_> {
     pub fn is_beyond(self, p: V3, radius: f32, reach: f32, prune: u32) -> bool {
         let limit = radius + reach;
         if self.is_mesh() {
-            self.mesh_is_beyond(p, radius, limit, prune)
+            self.mesh_is_beyond(p, limit, prune)
         } else {
             let distance = self.simple_value(p).distance;
             distance > limit + SIMPLE_ROUNDING * (p.abs().greatest() + distance.abs())
         }
     }
 
-    fn mesh_is_beyond(self, p: V3, radius: f32, limit: f32, prune: u32) -> bool {
+    fn mesh_is_beyond(self, p: V3, limit: f32, prune: u32) -> bool {
         let out = outside_box(p, self.vector(LOW), self.vector(HIGH));
         let far = limit.max(0.0f32) + ROUNDING;
         let mut beyond = out.dot(out) > far * far;
@@ -134,10 +134,6 @@ impl Field<'_> {
                     let v = self.mesh_value(cell, p, self.nearest(cell, p));
                     beyond = v.distance > select(none, 0.0f32, limit + ROUNDING);
                 }
-            }
-            // Only without its sign is the distance to an open mesh 1-Lipschitz everywhere.
-            if self.is_open() && beyond {
-                beyond = !self.may_be_inside(p, radius);
             }
         }
         beyond

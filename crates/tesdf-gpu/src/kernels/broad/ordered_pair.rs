@@ -273,10 +273,4 @@ impl Shapes {
         }
         pair.rotate(normal)
     }
-
-    /// The side of a part that is outside at a point in the frame of the field: 1 where its normal
-    /// points, -1 on the other side, and 0 on both sides or on none.
-    pub fn facing(&self, pair: OrderedPair, number: u32, at: V3) -> f32 {
-        self.field(pair.shape_a).facing(number, pair.to_surface(at))
-    }
 }

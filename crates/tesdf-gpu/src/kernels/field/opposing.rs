@@ -72,13 +72,8 @@ impl Field<'_> {
         // On the surface, the gradients are the normals of the faces.
         let on_surface = best.distance.abs() <= TIE;
         let turned = !same(c.height < 0.0f32, is_inside);
-        // A sheet has both of its sides there, and so has a face whose sides are alike.
-        let mut facing = 1.0f32;
-        if self.has_turned_faces() && on_surface && distance <= limit {
-            facing = self.facing(face, c.point);
-        }
-        let either = self.half_thickness() > 0.0f32 || facing == 0.0f32;
-        let other_side = select(either, f.normal.dot(normal) > 0.0f32, facing < 0.0f32);
+        // A sheet has both of its sides there.
+        let other_side = self.half_thickness() > 0.0f32 && f.normal.dot(normal) > 0.0f32;
         let turned = select(on_surface, other_side, turned);
         let over_face = f.normal * select(turned, -1.0f32, 1.0f32);
         let away = c.outward * (select(is_inside, -1.0f32, 1.0f32) / distance.max(LEAST_DIVISOR));

@@ -125,8 +125,7 @@ pub fn clip_polygons(
 #[cube]
 fn reaches_out(field: Field<'_>, subject: Subject) -> bool {
     let conforming = field.is_conforming();
-    (conforming && subject.reach > 0.0f32)
-        || (!conforming && (subject.reach >= field.number(BAND) || field.is_open()))
+    (conforming && subject.reach > 0.0f32) || (!conforming && subject.reach >= field.number(BAND))
 }
 
 /// A walk through the cells that a face meets, between two steps.

@@ -89,10 +89,8 @@ fn depth_of(field: Field<'_>, pair: OrderedPair, part: Part, thickness: f32) -> 
         let mut down = false;
         if looks < MAX_LOOKS && field.reaches(bounds, FINE * thickness) {
             let ball = here.ball();
-            let distance = field.exact_distance(ball.center);
-            deepest = deepest.max(pair.radius - distance);
-            // Beside a jump, the depth may be the distance.
-            let depth = pair.radius - select(field.is_open(), -distance.abs(), distance);
+            let depth = pair.radius - field.exact_distance(ball.center);
+            deepest = deepest.max(depth);
             looks += 1u32;
             let share = select(looks <= FINE_LOOKS, FINE, SURE);
             let wanted = (share * thickness).max(DEEPER * deepest);

@@ -23,7 +23,7 @@ impl Field<'_> {
         if self.is_mesh() {
             let cell = self.locate(p);
             found.cell = cell.number;
-            found.kept = (!cell.is_out() || reach >= self.number(BAND) || self.is_open())
+            found.kept = (!cell.is_out() || reach >= self.number(BAND))
                 && (prune == 0u32 || self.cell_bound(cell.number) <= reach);
         }
         found

@@ -9,7 +9,7 @@ use super::super::broad::meshlets::ROUNDING;
 use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, Counters};
 use super::super::field::nearest::FAR;
-use super::super::field::shapes::{Field, Shapes};
+use super::super::field::shapes::Shapes;
 use super::super::math::vector::V3;
 use super::super::middle::items::{Polygons, Weights};
 use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
@@ -128,7 +128,7 @@ fn halve(region: Region<'_>, goal: Goal, whole: Piece, best: Lowest, work: &mut 
         if is_middle {
             face = here.face;
         } else {
-            half.bound = region.bound(half, here, goal.tolerance, work);
+            half.bound = region.bound(half, here, work);
             let open = goal.is_open(half.bound, best);
             if is_first {
                 halves.first = half;
@@ -197,13 +197,6 @@ pub fn nowhere() -> Lowest {
     Lowest { distance: FAR.runtime(), at: Weights { s: 0.0f32, t: 0.0f32 } }
 }
 
-/// The cosine between a gradient and the outward normal of a part, from that with its normal. Where
-/// both sides of the part are alike, either counts.
-#[cube]
-pub fn opposed(cosine: f32, facing: f32) -> f32 {
-    select(facing == 0.0f32, -cosine.abs(), facing * cosine)
-}
-
 /// The result of a thread without a piece.
 #[cube]
 fn no_halves(best: Lowest) -> Halves {
@@ -227,23 +220,16 @@ fn minimize(region: Region<'_>, polygon: Polygon<'_>, normal: V3, goal: Goal, po
     let is_first = UNIT_POS == 0u32;
     let at_center = region.value(ball.center, is_first, &mut pool.work).distance;
     let mut found = Searched { best: Lowest { distance: at_center, at: ball.center }, converged: true };
-    let jumps = region.may_jump(polygon.part.at(ball.center.s, ball.center.t), ball.radius);
-    if select(jumps, -at_center.abs(), at_center) - ball.radius <= goal.reach + ROUNDING {
+    if at_center - ball.radius <= goal.reach + ROUNDING {
         let crossing = cell.is_crossing();
-        let all_inside = !jumps && (cell.is_inside() || (crossing && at_center < -ball.radius - ROUNDING));
+        let all_inside = cell.is_inside() || (crossing && at_center < -ball.radius - ROUNDING);
         let mut searches = true;
         if field.is_mesh() && cell.is_listed() && !all_inside {
             let nearest = nearest_listed(region, polygon, normal, pool);
             let here = region.value(nearest.at, is_first, &mut pool.work);
-            let other = Lowest { distance: here.distance, at: nearest.at };
+            found.best = Lowest { distance: here.distance, at: nearest.at };
             // The polygon may cross the surface, or be inside the solid.
-            searches = jumps || (crossing && (nearest.distance <= CLEAR || other.distance < 0.0f32));
-            // Off a jump, the nearest point is as low as the center, up to rounding.
-            if jumps {
-                found.best = found.best.or(other.distance, other.at);
-            } else {
-                found.best = other;
-            }
+            searches = crossing && (nearest.distance <= CLEAR || here.distance < 0.0f32);
         }
         if searches {
             found = search(region, polygon, goal, found.best, pool);
@@ -262,16 +248,6 @@ pub struct AskedExact {
     /// A contact is dropped when the cosine between its gradient and the face's normal is above
     /// minus this number.
     pub cos_theta: f32,
-    /// 1 for the fields of open meshes alone, otherwise 0: Frank–Wolfe does not see beyond a jump.
-    pub only_open: u32,
-}
-
-#[cube]
-impl AskedExact {
-    /// Whether the parts in a field are asked for.
-    pub fn has(&self, field: Field<'_>) -> bool {
-        self.only_open == 0u32 || field.is_open()
-    }
 }
 
 /// Finds the contact of a polygon per group.
@@ -298,16 +274,13 @@ pub fn narrow_exact(
         let region = region(field, cell, part);
         let reach = pairs.reach_of(pair, part);
         let goal = Goal { reach, tolerance: asked.tolerances[pair.b as usize] };
-        let mut found = Searched { best: nowhere(), converged: true };
-        if asked.has(field) {
-            found = minimize(region, polygons.polygon(number, part), normal, goal, &mut pool);
-        }
+        let found = minimize(region, polygons.polygon(number, part), normal, goal, &mut pool);
         pool.work.add_to(counters);
         if found.best.distance <= reach && UNIT_POS == 0u32 {
             let point = part.at(found.best.at.s, found.best.at.t);
             let v = field.value_in_cell(cell, point);
             if v.distance <= reach {
-                let cosine = opposed(v.gradient.dot(normal), shapes.facing(pair, item.face, point));
+                let cosine = v.gradient.dot(normal);
                 if pair.is_filtered(cosine, asked.cos_theta) {
                     counters.append(counters::FILTERED);
                 } else {

@@ -138,10 +138,6 @@ fn look(
     let mut known = Known { best: nowhere(), searches: true };
     let mut limit = goal.reach + 2.0f32 * CLEAR;
     let mut by = zero();
-    // Of an open mesh, the way out may lead through a hole, and nothing is proved.
-    let proves = !field.is_open();
-    let ball = polygons.whole(part).ball();
-    let jumps = region.may_jump(part.at(ball.center.s, ball.center.t), ball.radius);
     // First the face itself. Then it is moved along the gradient at the best point, and then
     // against its normal. This is a loop, so that the long code of distances stands here once.
     let mut attempt = 0u32;
@@ -160,7 +156,7 @@ fn look(
             known.best = found;
             // The field of a sheet is nowhere below 0.
             let crosses = near.distance <= CLEAR && field.half_thickness() == 0.0f32;
-            known.searches = found.distance < 0.0f32 || crosses || jumps;
+            known.searches = found.distance < 0.0f32 || crosses;
             let mine = here.distance == found.distance && at.s == found.at.s && at.t == found.at.t;
             outward.share(mine, here.gradient);
         } else {
@@ -169,7 +165,7 @@ fn look(
         limit = CLEARS * goal.tolerance;
         let length = goal.tolerance + (-known.best.distance).max(0.0f32);
         by = pick(is_first, outward.get(), normal.negated()) * length;
-        attempt = select(known.searches && proves, attempt + 1u32, 3u32);
+        attempt = select(known.searches, attempt + 1u32, 3u32);
     }
     known
 }
@@ -217,11 +213,8 @@ pub fn narrow_exact_faces(
         let tolerance = asked.tolerances[pair.b as usize];
         let face = facing(shapes, pairs, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
         let region = everywhere(face.field, face.part);
-        let mut found = Searched { best: nowhere(), converged: true };
-        if asked.has(face.field) {
-            found =
-                minimize(region, polygons, face.plane, Goal { reach: face.reach, tolerance }, &mut memory);
-        }
+        let goal = Goal { reach: face.reach, tolerance };
+        let found = minimize(region, polygons, face.normal, goal, &mut memory);
         if found.best.distance <= face.reach {
             face.report(found.best.at, found.converged, counters, contacts, &mut memory);
         }

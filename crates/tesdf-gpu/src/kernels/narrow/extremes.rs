@@ -12,14 +12,11 @@ use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs, Part, PartExp
 use super::super::counters::{self, Counters};
 use super::super::field::locate::no_cell;
 use super::super::field::nearest::FAR;
-use super::super::field::shapes::{
-    BOX, FACE_COUNT, Field, FieldExpand, KIND, NONE, PLANE, REACH_BEYOND, Shapes,
-};
+use super::super::field::shapes::{BOX, FACE_COUNT, Field, FieldExpand, KIND, NONE, PLANE, Shapes};
 use super::super::math::triangle::Face;
-use super::super::math::vector::{LEAST_DIVISOR, V3, centroid, pick, v3, zero};
+use super::super::math::vector::{LEAST_DIVISOR, V3, pick, zero};
 use super::super::middle::items::Weights;
 use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
-use super::exact::opposed;
 use super::near::{FACES, Walk, axes_of};
 use super::piece::{Lowest, Pool};
 use super::polygon_distance::weights_of;
@@ -61,10 +58,8 @@ pub struct Facing<'a> {
     pub pair: OrderedPair,
     pub face: u32,
     pub part: Part,
-    /// Unit normal by the order of the corners, or zero.
-    pub plane: V3,
-    /// The same, turned to the side that is outside at the center.
-    normal: V3,
+    /// Unit normal, or zero.
+    pub normal: V3,
     /// Contact distance for the part: smaller distances are contacts.
     pub reach: f32,
     /// The body that has the face.
@@ -93,16 +88,12 @@ pub fn facing<'a>(
     limits: Limits,
 ) -> Facing<'a> {
     let part = shapes.part(pair, face);
-    let plane = shapes.part_normal(pair, face);
-    let center = centroid(part.a, part.b, part.c);
-    let is_turned = shapes.facing(pair, face, center) < 0.0f32;
     Facing::<'a> {
         field: shapes.field(pair.shape_b),
         pair,
         face,
         part,
-        plane,
-        normal: plane * select(is_turned, -1.0f32, 1.0f32),
+        normal: shapes.part_normal(pair, face),
         reach: pairs.reach_of(pair, part),
         surface: shapes.field(pair.shape_a),
         limits,
@@ -121,8 +112,6 @@ struct Patch {
     depth: f32,
     /// Faces of the other body are looked at up to this distance.
     near: f32,
-    /// The normal on the side that touches.
-    normal: V3,
 }
 
 /// A direction in the plane of a face: its products with both edges at the first corner.
@@ -197,12 +186,10 @@ impl Part {
 
 #[cube]
 impl Field<'_> {
-    /// The diagonal of the bounds of the faces.
+    /// The diagonal of the bounds.
     fn diagonal(self) -> f32 {
         let bounds = self.bounds();
-        let beyond = select(self.is_mesh(), 2.0f32 * self.number(REACH_BEYOND), 0.0f32);
-        let extent = (bounds.high - bounds.low) + v3(-beyond, -beyond, -beyond);
-        select(self.entry(KIND) == PLANE, FAR, extent.length())
+        select(self.entry(KIND) == PLANE, FAR, (bounds.high - bounds.low).length())
     }
 }
 
@@ -263,16 +250,12 @@ impl Facing<'_> {
         let own = select(minimum.corner == NO_CORNER, 0u32, 1u32);
         let is_flat = self.part.count > 1u32 && (is_large || level > own);
         let limit = select(is_large, self.reach, v.distance + self.limits.tolerance);
-        // A normal that may be that of the other side is turned against the gradient.
-        let is_other = self.surface.has_turned_faces() && v.gradient.dot(self.normal) > 0.0f32;
-        let normal = self.normal * select(is_other, -1.0f32, 1.0f32);
-        let opposes = v.gradient.dot(normal) < OPPOSES;
+        let opposes = v.gradient.dot(self.normal) < OPPOSES;
         Patch {
             limit: select(is_flat, limit, -FAR),
             opposes: select(self.has_plane(), OPPOSES, 2.0f32),
             depth: select(opposes, -v.distance, 0.0f32).max(0.0f32),
             near: limit.abs().max(v.distance.abs()),
-            normal,
         }
     }
 
@@ -293,13 +276,13 @@ impl Facing<'_> {
                 work.evaluate(self.field.exact_distances(cell, found.point), is_own);
             }
             let v = self.field.exact_value_in(cell, found.point);
-            let v = self.field.opposing(cell, found.point, patch.normal, v);
-            let along = v.gradient.dot(patch.normal);
+            let v = self.field.opposing(cell, found.point, self.normal, v);
+            let along = v.gradient.dot(self.normal);
             found.value = v;
             found.cell = cell.name();
             found.is_taken = v.distance <= patch.limit && along < patch.opposes;
             let missing = v.distance + patch.depth;
-            let sideways = v.gradient + patch.normal * -along;
+            let sideways = v.gradient + self.normal * -along;
             let square = sideways.dot(sideways);
             let slope = square.sqrt().max(LEVEL);
             let way = (BEYOND * missing.max(0.0f32) + HEIGHT) / slope;
@@ -317,7 +300,7 @@ impl Facing<'_> {
     /// where that leaves the face, as at a sharp corner of the patch.
     fn inwards(self, p: V3, outward: V3, way: f32) -> Inwards {
         let straight = p + outward * -way;
-        let is_straight = self.part.holds(self.plane, straight, 0.0f32);
+        let is_straight = self.part.holds(self.normal, straight, 0.0f32);
         let mut point = straight;
         let mut is_inside = is_straight;
         let mut nearest = FAR.runtime();
@@ -329,7 +312,7 @@ impl Facing<'_> {
             let length = way / rise.abs().max(LEVEL);
             let next = p + along * select(rise < 0.0f32, length, -length);
             let is_nearer = rise.abs() > LEVEL && length < nearest;
-            let taken = !is_straight && is_nearer && self.part.holds(self.plane, next, HEIGHT);
+            let taken = !is_straight && is_nearer && self.part.holds(self.normal, next, HEIGHT);
             nearest = select(taken, length, nearest);
             point = pick(taken, next, point);
             is_inside = is_inside || taken;
@@ -343,7 +326,7 @@ impl Facing<'_> {
     /// call it.
     fn farthest(self, to: Direction, patch: Patch, walk: &mut Walk, pool: &mut Pool) -> Lowest {
         let quarter = UNIT_POS / DIRECTIONS;
-        let axes = axes_of(self.part, self.plane);
+        let axes = axes_of(self.part, self.normal);
         let near = patch.near;
         let limit = near + axes.rounding;
         let is_mesh = self.field.is_mesh();
@@ -371,7 +354,7 @@ impl Facing<'_> {
                 if face != NONE {
                     let f = self.field.face(face);
                     if !is_mesh || axes.to_face(f) <= limit {
-                        best = self.overlay(to, f, patch.normal, select(is_mesh, near + HEIGHT, FAR), best);
+                        best = self.overlay(to, f, select(is_mesh, near + HEIGHT, FAR), best);
                     }
                 }
                 i += 1u32;
@@ -383,12 +366,10 @@ impl Facing<'_> {
 
     /// Offers the corners of the overlay of the part and a face of the other body, as far as the
     /// face is within `limit` there.
-    fn overlay(self, to: Direction, f: Face, facing: V3, limit: f32, start: Lowest) -> Lowest {
-        let (part, normal) = (self.part, self.plane);
+    fn overlay(self, to: Direction, f: Face, limit: f32, start: Lowest) -> Lowest {
+        let (part, normal) = (self.part, self.normal);
         let mut best = start;
-        // A face that may have the inside in front of it tells nothing by its normal.
-        let opposes = f.normal.dot(facing) <= 0.0f32 || self.field.has_turned_faces();
-        if !f.is_flat() && opposes {
+        if !f.is_flat() && f.normal.dot(normal) <= 0.0f32 {
             let edges = select(part.count == 3u32, 3u32, 1u32);
             let mut k = 0u32;
             while k < 3u32 {
@@ -440,23 +421,13 @@ impl Facing<'_> {
 
     /// Writes a contact, or counts it as filtered.
     fn write(self, taken: Taken, converged: bool, counters: &Counters, contacts: &mut Contacts) {
-        let facing = self.surface.facing(self.face, self.pair.to_surface(taken.point));
-        let mut v = taken.value;
-        let mut cosine = opposed(v.gradient.dot(self.plane), facing);
-        if self.surface.has_turned_faces() {
-            let outward = self.plane * facing;
-            // The value opposes the side that is outside at the center.
-            if outward.dot(self.normal) < 0.0f32 {
-                v = self.field.opposing(self.field.cell_at(taken.point), taken.point, outward, v);
-                cosine = v.gradient.dot(outward);
-            }
-        }
+        let cosine = taken.value.gradient.dot(self.normal);
         if self.pair.is_filtered(cosine, self.limits.cos_theta) {
             counters.append(counters::FILTERED);
         } else {
             let corner = taken.corner + select(converged, CONVERGED, 0u32);
             let touch = Touch { face: self.face, cell: taken.cell, corner, point: taken.point, cosine };
-            contacts.append(counters, self.pair, touch, v);
+            contacts.append(counters, self.pair, touch, taken.value);
         }
     }
 
@@ -472,8 +443,7 @@ impl Facing<'_> {
     ) {
         let direction = UNIT_POS % DIRECTIONS;
         memory.points.clear();
-        let anywhere =
-            Patch { limit: FAR.runtime(), opposes: 2.0f32, depth: 0.0f32, near: 0.0f32, normal: self.normal };
+        let anywhere = Patch { limit: FAR.runtime(), opposes: 2.0f32, depth: 0.0f32, near: 0.0f32 };
         let mut patch = anywhere;
         let mut to = self.direction(direction);
         // Whether this thread's direction has no extreme yet.

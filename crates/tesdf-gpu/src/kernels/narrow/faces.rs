@@ -18,7 +18,6 @@ use super::super::math::triangle::Face;
 use super::super::math::vector::{Row, V3, row_of, xyz};
 use super::super::middle::items::{MAX_VERTICES, Polygons, Weights};
 use super::contacts::{Contacts, NO_CORNER, Touch};
-use super::exact::opposed;
 use super::exchange::{Exchange, LANES, Variant, exchange, width_for};
 use super::polygon_distance::Polygon;
 
@@ -452,8 +451,7 @@ pub fn narrow_faces(
         let cell = field.cell(item.cell);
         let list = share_list(field, cell, variant);
         let polygon = polygons.polygon(number, part);
-        // The exact mode is for open meshes.
-        let reach = select(field.is_open(), -FAR, pairs.reach_of(pair, part));
+        let reach = pairs.reach_of(pair, part);
         let search = minimize(field, list, polygon, reach, asked.iterations, &mut exchange, &mut best);
         if comptime!(lanes > 1) {
             // Another thread than the one that writes the contact may have found it.
@@ -465,7 +463,6 @@ pub fn narrow_faces(
             let v = best.get(select(lanes == 1u32, UNIT_POS, 0u32), search.distance);
             let point = part.at(search.best.s, search.best.t);
             let cosine = v.gradient.dot(shapes.part_normal(pair, item.face));
-            let cosine = opposed(cosine, shapes.facing(pair, item.face, point));
             if pair.is_filtered(cosine, asked.cos_theta) {
                 counters.append(counters::FILTERED);
             } else {

@@ -4,7 +4,6 @@ use tesdf::collide::ContactsPer;
 
 use super::super::broad::ordered_pair::Part;
 use super::super::field::locate::{Cell, no_cell};
-use super::super::field::nearest::FAR;
 use super::super::field::shapes::Field;
 use super::super::field::value::Value;
 use super::super::math::greatest_minimum::Functions;
@@ -170,16 +169,6 @@ impl Region<'_> {
         }
     }
 
-    /// Whether the side may change without a face within `radius` of a point. All points of a listed
-    /// cell that no face crosses are on one side.
-    pub fn may_jump(self, p: V3, radius: f32) -> bool {
-        let mut may = false;
-        if !self.cell.is_listed() || self.cell.is_crossing() {
-            may = self.field.may_jump(p, radius);
-        }
-        may
-    }
-
     /// How many distances of a point and a face an evaluation takes.
     fn distances_at(self, p: V3) -> u32 {
         if comptime!(self.per == ContactsPer::Face) {
@@ -234,10 +223,7 @@ impl Region<'_> {
     /// The bound of a piece, with the field at its center: the value there minus the radius, or
     /// minus the greatest minimum of four functions that the depth does not exceed, whichever is
     /// greater.
-    ///
-    /// Where the side may change without a face, the depth at the center is its distance. A piece with
-    /// a radius of at most `tolerance` is dropped there: its center was looked at.
-    pub fn bound(self, piece: Piece, here: Value, tolerance: f32, work: &mut Work) -> f32 {
+    pub fn bound(self, piece: Piece, here: Value, work: &mut Work) -> f32 {
         let points = Points {
             a: self.part.at(piece.a.s, piece.a.t),
             b: self.part.at(piece.b.s, piece.b.t),
@@ -246,8 +232,7 @@ impl Region<'_> {
         let middle = centroid(points.a, points.b, points.c);
         let radius =
             (points.a - middle).length().max((points.b - middle).length()).max((points.c - middle).length());
-        let jumps = self.may_jump(middle, radius);
-        let mut bound = select(jumps, -here.distance.abs(), here.distance) - radius;
+        let mut bound = here.distance - radius;
         let is_mesh = self.field.is_mesh();
         if !is_mesh || bound < 0.0f32 {
             if comptime!(work.counting) {
@@ -261,7 +246,7 @@ impl Region<'_> {
             };
             bound = bound.max(-functions.greatest_minimum());
         }
-        select(jumps && radius <= tolerance, FAR, bound)
+        bound
     }
 }
 

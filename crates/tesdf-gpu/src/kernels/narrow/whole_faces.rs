@@ -5,7 +5,6 @@ use cubecl::prelude::*;
 use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, Counters};
 use super::super::field::locate::no_cell;
-use super::super::field::nearest::FAR;
 use super::super::field::shapes::Shapes;
 use super::super::middle::items::Polygons;
 use super::contacts::Contacts;
@@ -39,12 +38,10 @@ pub fn narrow_whole_faces(
         let face = facing(shapes, pairs, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
         let list = share_list(face.field, no_cell(), variant);
         let polygon = polygons.whole(face.part);
-        // The exact mode is for open meshes.
-        let iterations = asked.iterations;
-        let reach = select(face.field.is_open(), -FAR, face.reach);
-        let search = minimize(face.field, list, polygon, reach, iterations, &mut exchange, &mut best);
+        let search =
+            minimize(face.field, list, polygon, face.reach, asked.iterations, &mut exchange, &mut best);
         search.count(counters, variant);
-        if search.distance <= reach {
+        if search.distance <= face.reach {
             // Nothing proves that no point is lower.
             face.report(search.best, false.runtime(), counters, contacts, &mut memory);
         }

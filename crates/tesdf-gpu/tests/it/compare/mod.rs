@@ -225,21 +225,8 @@ fn faces_hold(scene: &Scene, options: &CollideOptions, size: f64, sides: [&Conta
         });
         let deepest = h.into_iter().chain(d).fold(f64::INFINITY, f64::min);
         let is_close = || reach(scene, options, key) - deepest < ROUNDING * size;
-        // Nothing proves that the least that Frank–Wolfe finds is the least over the face. Of a large
-        // face, a corner of what touches may be deeper. So the least of one side has to be a contact of
-        // the other.
-        let is_local = |side: usize, least: f64| {
-            options.mode == Mode::Face
-                && sides[side]
-                    .iter()
-                    .filter(|c| &&(c.instance_a, c.instance_b, c.feature.a) == key)
-                    .any(|c| (c.distance - least).abs() <= ANOTHER_WAY * size)
-        };
         match (h, d) {
-            (Some(h), Some(d)) => {
-                let is_same = (h - d).abs() <= ANOTHER_WAY * size || is_local(0, d) || is_local(1, h);
-                others += usize::from(!is_same);
-            }
+            (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
             _ => {
                 assert!(
                     options.cos_theta.is_some() || is_close(),

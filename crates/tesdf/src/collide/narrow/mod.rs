@@ -82,37 +82,6 @@ impl Search {
         Self { reach, ..self }
     }
 
-    /// The search that [`may_reach`](Self::may_reach) uses for contacts of this search up to
-    /// `distance` (field's frame).
-    pub fn of_whole_faces(self, field: &FieldBody, distance: f64) -> Self {
-        let reach = distance + 2.0 * self.tolerance + field.rounding();
-        Self { mode: Mode::Exact, per: ContactsPer::Face, reach, ..self }
-    }
-
-    /// Whether a part can have a contact within reach. `false` is certain. Where contacts are
-    /// found in inexact lists, nothing is certain.
-    pub fn may_reach(&self, field: &FieldBody, part: &Part, around: Option<&Surroundings>) -> bool {
-        if part.points().len() == 1 {
-            // The contact itself takes no more time.
-            return true;
-        }
-        let reach = self.reach + part.radius;
-        let around = match (field.field, around) {
-            (Field::Simple(simple), _) => {
-                // A convex function lies above its tangents.
-                let (center, _) = part.ball();
-                let (value, slack) = Field::Simple(simple).rough_value(center);
-                let slope = part.points().iter().map(|p| value.gradient.dot(*p - center));
-                return value.distance + slope.fold(f64::INFINITY, f64::min) <= reach + 4.0 * slack;
-            }
-            (Field::Mesh(_), Some(around)) if field.has_exact_lists() => around,
-            (Field::Mesh(_), _) => return true,
-        };
-        let cell = CellField::Whole(around);
-        self.exact(&cell, &Polygon::new(part.points()), part, reach)
-            .is_some_and(|found| !found.converged || cell.rough(found.point).0 <= reach + ROUNDING)
-    }
-
     /// Clips a part by the cells of the field and visits each polygon.
     pub fn polygons(&self, field: &FieldBody, part: &Part, visit: &mut impl FnMut(&ClippedPolygon)) {
         let polygon = Polygon::new(part.points());

@@ -27,8 +27,8 @@
 //! a reduction loses".
 
 mod bins;
-mod deepest;
 mod loss;
+mod report;
 mod selection;
 mod survivors;
 mod wrenches;
@@ -41,8 +41,8 @@ use glam::DVec3;
 use super::hull::{Wrench, dot, residual};
 use super::{Contact, InstanceId, PairReduction, Reduction};
 use bins::{Bins, sort_bytes};
-pub use deepest::{Unfound, deepest_of_pair, report_of_kept, split_deepest};
 use loss::{Loss, Projected};
+pub use report::{Unfound, report_of_kept};
 use selection::Selection;
 use survivors::{PER_BIN, Survivors};
 pub use wrenches::FLAT;
@@ -57,8 +57,7 @@ const BINS_PER_KEPT: usize = 4;
 /// order. The reports are sorted by instances, one for each pair that touches. [`Reduction::None`]
 /// returns the contacts unchanged, without reports.
 ///
-/// [`Reduction::Deepest`] keeps the contacts that a detection with it finds. Its reports are those
-/// of contacts that were all found. [`Reduction::Spread`] keeps those of [`Reduction::PerPair`].
+/// [`Reduction::Spread`] keeps those of [`Reduction::PerPair`].
 ///
 /// A number of 0, which [`CollideOptions::validate`](super::CollideOptions::validate) refuses,
 /// counts as 1.
@@ -69,9 +68,6 @@ pub fn reduce_pairs(contacts: Vec<Contact>, reduction: Reduction) -> (Vec<Contac
     let Reduced { contacts, reports, .. } = reduced(contacts, reduction);
     (contacts, reports)
 }
-
-/// Reduces the contacts of one pair, whose runs are given, to a number of contacts.
-type OneReduction = fn(&[Contact], &[Run], usize) -> OfPair;
 
 /// The result of a reduction.
 pub struct Reduced {
@@ -84,10 +80,9 @@ pub struct Reduced {
 
 /// As [`reduce_pairs`], with the bytes.
 pub fn reduced(mut contacts: Vec<Contact>, reduction: Reduction) -> Reduced {
-    let (n, reduce): (u32, OneReduction) = match reduction {
+    let n = match reduction {
         Reduction::None => return Reduced { contacts, reports: Vec::new(), bytes: 0 },
-        Reduction::PerPair(n) | Reduction::Spread(n) => (n, reduce),
-        Reduction::Deepest(n) => (n, deepest::reduce),
+        Reduction::PerPair(n) | Reduction::Spread(n) => n,
     };
     let mut runs = runs(&contacts);
     runs.sort_unstable();

@@ -16,21 +16,14 @@ pub enum ReadTetrahedraError {
     },
     /// The extension names no format.
     #[error(
-        "{}: the extension names no format of tetrahedra that can be read; expected one of {}",
+        "{}: the extension names no format of tetrahedra that can be read; expected one of {}: `meshio convert FILE OUT.msh` \
+         converts others",
         path.display(),
         TetFormat::ALL.map(|f| format!(".{}", f.extension())).join(", ")
     )]
     UnknownExtension {
         /// The path asked for.
         path: PathBuf,
-    },
-    /// The library was built without the feature that reads the format.
-    #[error(
-        "{format}: tesdf was built without the feature `vtu`; build it with it, or convert the file to Gmsh's format"
-    )]
-    NotBuilt {
-        /// The format.
-        format: TetFormat,
     },
     /// The bytes do not follow the rules of the format.
     #[error("{format}, {place}: {found}; {help}")]

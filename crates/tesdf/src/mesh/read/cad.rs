@@ -6,12 +6,10 @@ use crate::base::Length;
 
 #[cfg(feature = "gmsh")]
 mod by_gmsh;
-#[cfg(not(feature = "gmsh"))]
-#[path = "cad/no_gmsh.rs"]
-mod by_gmsh;
 #[cfg(feature = "gmsh")]
 mod msh;
 
+#[cfg(feature = "gmsh")]
 pub(super) use by_gmsh::parse;
 
 /// How finely the surfaces of a CAD file become triangles, and how to run Gmsh.

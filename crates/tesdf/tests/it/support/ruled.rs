@@ -6,7 +6,7 @@ use super::random::Random;
 use tesdf::TeSdf;
 use tesdf::base::{Inside, InsideRule};
 use tesdf::collide::{
-    ClearanceOptions, CollideOptions, ContactsPer, Instance, Mode, Pose, Reduction, Scene, clearance, detect,
+    ClearanceOptions, CollideOptions, ContactsPer, Instance, Mode, Pose, Scene, clearance, detect,
 };
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
@@ -127,10 +127,6 @@ pub fn assert_contacts(a: &Body, b: &Body, poses: [Pose; 2]) {
         if mode == Mode::Exact {
             let sampled = sampled[0].min(sampled[1]);
             assert!(deepest <= sampled + tolerance, "{deepest} {sampled}");
-            let kept = CollideOptions { reduction: Reduction::Deepest(3), ..options };
-            let kept = detect(&scene, &kept).expect("contacts");
-            let least = kept.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
-            assert!((least - deepest).abs() <= tolerance, "{least} {deepest}");
         }
     }
     let found = clearance(&scene, ids[0], ids[1], &ClearanceOptions::default()).expect("a clearance");

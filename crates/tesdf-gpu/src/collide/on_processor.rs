@@ -1,0 +1,159 @@
+//! Instances whose contacts kernels do not find. The processor does.
+use std::borrow::Cow;
+
+use tesdf::collide::{
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, InstancePair, InstancePairs,
+    Scene, Shape, Statistics, detect_pairs,
+};
+
+use super::on_device::DeviceContacts;
+use crate::GpuError;
+use crate::device::{Device, DeviceArray, Word};
+
+/// A scene by where contacts are found.
+pub struct Divided<'a> {
+    /// The scene without the instances of [`on_processor`](Self::on_processor).
+    pub on_device: Cow<'a, Scene>,
+    /// The instances that kernels do not detect, in the order of ids. The processor finds all their contacts.
+    pub on_processor: Vec<InstanceId>,
+}
+
+impl<'a> Divided<'a> {
+    /// Divides the instances of a scene by their shapes.
+    pub fn new(scene: &'a Scene) -> Result<Self, CollideError> {
+        if !has_undetected(scene) {
+            return Ok(Self { on_device: Cow::Borrowed(scene), on_processor: Vec::new() });
+        }
+        let mut on_processor = Vec::new();
+        for (id, instance) in scene.instances() {
+            if is_undetected(scene.shape(instance.shape)?) {
+                on_processor.push(id);
+            }
+        }
+        let mut on_device = scene.clone();
+        on_device.remove(&on_processor)?;
+        Ok(Self { on_device: Cow::Owned(on_device), on_processor })
+    }
+
+    /// The pairs of instances that the processor detects.
+    pub fn pairs(&self, scene: &Scene, options: &CollideOptions) -> Result<Vec<InstancePair>, CollideError> {
+        if self.on_processor.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut pairs = InstancePairs::new();
+        pairs.update(scene, options)?;
+        let has = |id: &InstanceId| self.on_processor.binary_search(id).is_ok();
+        Ok(pairs.pairs().iter().filter(|pair| has(&pair.first) || has(&pair.second)).copied().collect())
+    }
+}
+
+/// Whether a scene has shapes whose contacts kernels do not find.
+pub fn has_undetected(scene: &Scene) -> bool {
+    scene.shapes().any(|(_, shape)| is_undetected(shape))
+}
+
+fn is_undetected(shape: &Shape) -> bool {
+    matches!(shape, Shape::Mesh(asset) if !asset.is_detected_on_devices())
+}
+
+/// The place of the contacts of two instances in the order of all.
+fn place(scene: &Scene, a: InstanceId, b: InstanceId) -> (u32, InstanceId, InstanceId) {
+    let world = scene.instance(a).map_or(0, |instance| instance.world);
+    (world, a.min(b), a.max(b))
+}
+
+/// Overlaps of both, in the order of all.
+fn merged(scene: &Scene, one: &[HiddenOverlap], other: &[HiddenOverlap]) -> Vec<HiddenOverlap> {
+    let mut hidden = [one, other].concat();
+    hidden.sort_by_key(|h| place(scene, h.instance_a, h.instance_b));
+    hidden
+}
+
+/// Adds the contacts of pairs that the processor detects to those of all other pairs, in the order
+/// of all.
+pub fn with_pairs(
+    found: Contacts,
+    pairs: &[InstancePair],
+    scene: &Scene,
+    options: &CollideOptions,
+) -> Result<Contacts, CollideError> {
+    if pairs.is_empty() {
+        return Ok(found);
+    }
+    let others = detect_pairs(pairs, scene, options)?;
+    let (one, other) = (found.statistics, others.statistics);
+    let statistics = Statistics {
+        instance_pairs: one.instance_pairs + other.instance_pairs,
+        candidates: one.candidates + other.candidates,
+        polygons: one.polygons + other.polygons,
+        touching: one.touching + other.touching,
+        filtered: one.filtered + other.filtered,
+        reduced: one.reduced + other.reduced,
+        unconverged: one.unconverged + other.unconverged,
+        bytes: one.bytes + other.bytes,
+    };
+    let mut reductions = [found.reductions.clone(), others.reductions.clone()].concat();
+    reductions.sort_by_key(|r| (r.instance_a, r.instance_b));
+    let hidden = merged(scene, &found.hidden, &others.hidden);
+    // Both are sorted within each pair, which a stable sort keeps.
+    let mut contacts = [found.into_vec(), others.into_vec()].concat();
+    contacts.sort_by_key(|c| place(scene, c.instance_a, c.instance_b));
+    Ok(Contacts::new(contacts, statistics, reductions, hidden))
+}
+
+/// The same for contacts that stay on a device.
+pub fn with_pairs_on_device(
+    found: DeviceContacts,
+    pairs: &[InstancePair],
+    scene: &Scene,
+    options: &CollideOptions,
+    device: &Device,
+) -> Result<DeviceContacts, GpuError> {
+    if pairs.is_empty() {
+        return Ok(found);
+    }
+    let others = detect_pairs(pairs, scene, options)?;
+    let ids = found.instances.read(device)?;
+    let of_device = ids.chunks_exact(2).map(|pair| (InstanceId(pair[0]), InstanceId(pair[1])));
+    let all = of_device.chain(others.iter().map(|c| (c.instance_a, c.instance_b)));
+    let mut order: Vec<_> = all.map(|(a, b)| place(scene, a, b)).zip(0..).collect();
+    // The second number keeps the order within each pair.
+    order.sort_unstable();
+    let order: Vec<usize> = order.into_iter().map(|(_, at)| at).collect();
+    let both = Both { device, others: others.as_slice(), order: &order };
+    let merged = DeviceContacts {
+        count: order.len(),
+        points_a: both.array(&found.points_a, |c| c.point_a.as_vec3().to_array())?,
+        points_b: both.array(&found.points_b, |c| c.point_b.as_vec3().to_array())?,
+        normals: both.array(&found.normals, |c| c.normal.as_vec3().to_array())?,
+        distances: both.array(&found.distances, |c| [c.distance as f32])?,
+        instances: both.array(&found.instances, |c| [c.instance_a.0, c.instance_b.0])?,
+        hidden: merged(scene, &found.hidden, &others.hidden),
+    };
+    device.wait()?;
+    Ok(merged)
+}
+
+/// Contacts of a device and of the processor.
+struct Both<'a> {
+    device: &'a Device,
+    /// Those of the processor.
+    others: &'a [Contact],
+    /// For each place, the contact that comes there; those of the processor follow those of the device.
+    order: &'a [usize],
+}
+
+impl Both<'_> {
+    /// An array of all contacts, from that of the device and the rows of the others.
+    fn array<T: Word, const N: usize>(
+        &self,
+        found: &DeviceArray<T>,
+        row: impl Fn(&Contact) -> [T; N],
+    ) -> Result<DeviceArray<T>, GpuError> {
+        let mut rows = found.read(self.device)?;
+        rows.extend(self.others.iter().flat_map(row));
+        let ordered: Vec<T> =
+            self.order.iter().flat_map(|&at| &rows[N * at..N * (at + 1)]).copied().collect();
+        DeviceArray::upload(self.device, &ordered)
+    }
+}
