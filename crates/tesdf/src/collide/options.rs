@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
-use super::CollideError;
 use crate::base::Length;
+use crate::collide::scene::error::CollideError;
 use crate::query::Precision;
 
 /// The part of body *a* that is tested against the field of body *b*.
@@ -63,15 +63,15 @@ pub enum Reduction {
     /// deepest contact of all may be missing; [`PairReduction::left_out_above`] says how deep it
     /// can be. A device finds all contacts and keeps those of [`PerPair`](Self::PerPair).
     ///
-    /// [`PairReduction::left_out_above`]: super::PairReduction::left_out_above
+    /// [`PairReduction::left_out_above`]: crate::collide::PairReduction::left_out_above
     Spread(u32),
 }
 
-/// Whether a detection searches for [hidden overlaps](super::HiddenOverlap).
+/// Whether a detection searches for [hidden overlaps](crate::collide::HiddenOverlap).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HiddenSearch {
-    /// [`Contacts::hidden`](super::Contacts::hidden) lists them.
+    /// [`Contacts::hidden`](crate::collide::Contacts::hidden) lists them.
     #[default]
     On,
     /// None are listed. This saves time in the mode [`Node`](Mode::Node), where contacts miss most,

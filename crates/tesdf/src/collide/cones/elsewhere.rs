@@ -1,7 +1,10 @@
 //! Contacts that were found elsewhere, as on a GPU, and contacts that both orders of a pair find.
 use super::Cones;
 use super::cone::{PARALLEL, SAME};
-use crate::collide::{CollideError, CollideOptions, Contact, ContactsPer, Scene};
+use crate::collide::options::{CollideOptions, ContactsPer};
+use crate::collide::report::contact::Contact;
+use crate::collide::scene::Scene;
+use crate::collide::scene::error::CollideError;
 use crate::parallel::*;
 use crate::query::Precision;
 

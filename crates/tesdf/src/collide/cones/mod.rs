@@ -14,9 +14,12 @@ mod elsewhere;
 
 use glam::DVec3;
 
-use super::field::ROUNDING;
-use super::shape::least_and_most;
-use super::{Contact, ContactsPer, Placement, Shape};
+use crate::collide::bodies::field::ROUNDING;
+use crate::collide::options::ContactsPer;
+use crate::collide::report::contact::Contact;
+use crate::collide::scene::pose::Placement;
+use crate::collide::scene::shape::Shape;
+use crate::collide::scene::shape::least_and_most;
 use crate::query::Precision;
 use around::around;
 use cone::{Cone, Normals, PARALLEL, SAME, clamped, common, crossing, least_cosine};

@@ -8,10 +8,10 @@ use glam::DVec3;
 
 use super::Lowest;
 use crate::TeSdf;
-use crate::collide::field::{CellField, ROUNDING};
-use crate::collide::field_value::FieldValue;
-use crate::collide::greatest_minimum::{self, CORNERS, summit};
-use crate::collide::polygon::{MAX_VERTICES, Polygon};
+use crate::collide::bodies::field::{CellField, ROUNDING};
+use crate::collide::bodies::polygon::{MAX_VERTICES, Polygon};
+use crate::collide::scene::field_value::FieldValue;
+use crate::collide::search::greatest_minimum::{self, CORNERS, summit};
 use crate::geometry::Triangle;
 use crate::query::{Precision, Surroundings};
 

@@ -6,9 +6,9 @@ use super::branch_and_bound::{self, branch_and_bound};
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
-use crate::collide::field::{CellField, ROUNDING};
-use crate::collide::field_value::FieldValue;
-use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
+use crate::collide::bodies::field::{CellField, ROUNDING};
+use crate::collide::bodies::polygon::{MAX_VERTICES, Parts, Polygon};
+use crate::collide::scene::field_value::FieldValue;
 use crate::geometry::polygon_to_triangle;
 use crate::query::{Faces, Place, Precision, Surroundings};
 

@@ -12,9 +12,9 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::{Minimum, Search, cell_of};
-use crate::collide::field::CellField;
-use crate::collide::field_value::FieldValue;
-use crate::collide::surface::{Part, PartFacing};
+use crate::collide::bodies::field::CellField;
+use crate::collide::bodies::surface::{Part, PartFacing};
+use crate::collide::scene::field_value::FieldValue;
 use crate::geometry::{Feature, Triangle};
 use crate::query::Faces;
 

@@ -1,6 +1,6 @@
 use super::Lowest;
-use crate::collide::field::{CellField, ROUNDING};
-use crate::collide::polygon::Polygon;
+use crate::collide::bodies::field::{CellField, ROUNDING};
+use crate::collide::bodies::polygon::Polygon;
 use crate::query::Precision;
 
 /// Eq. (9) by Frank–Wolfe. It starts at the best of the centre and the vertices, and makes steps of

@@ -7,12 +7,12 @@ pub mod jump;
 
 use glam::DVec3;
 
-use super::field::{CellField, Field, FieldBody, ROUNDING, TIE};
-use super::field_value::FieldValue;
-use super::middle::{self, ClippedPolygon};
-use super::polygon::Polygon;
-use super::surface::Part;
-use super::{CollideOptions, ContactsPer, Mode};
+use crate::collide::bodies::clip::{self, ClippedPolygon};
+use crate::collide::bodies::field::{CellField, Field, FieldBody, ROUNDING, TIE};
+use crate::collide::bodies::polygon::Polygon;
+use crate::collide::bodies::surface::Part;
+use crate::collide::options::{CollideOptions, ContactsPer, Mode};
+use crate::collide::scene::field_value::FieldValue;
 use crate::geometry::{Aabb, Triangle};
 use crate::query::{Faces, Place, Precision, Surroundings};
 use extremes::{OPPOSES, Patch};
@@ -89,8 +89,8 @@ impl Search {
         // bound 0.
         let reach = (self.reach + part.radius).max(0.0);
         match (field.field, part.points()) {
-            (Field::Mesh(asset), &[point]) => middle::locate(asset, point, reach, visit),
-            (Field::Mesh(asset), _) => middle::clip(asset, polygon, reach, visit),
+            (Field::Mesh(asset), &[point]) => clip::locate(asset, point, reach, visit),
+            (Field::Mesh(asset), _) => clip::clip(asset, polygon, reach, visit),
             (Field::Simple(_), _) => {
                 visit(&ClippedPolygon { polygon, place: Place::NotOfDomain, cell: None });
             }

@@ -1,0 +1,264 @@
+//! A moving body, and the parts of its surface at a time: nodes of its face tree and faces.
+use glam::{DMat3, DVec3, Vec3};
+
+use crate::asset::layout::TreeChild;
+use crate::collide::clearance::Body;
+use crate::collide::scene::error::CollideError;
+use crate::collide::scene::motion::{Motion, Twist};
+use crate::collide::scene::pose::Placement;
+use crate::collide::scene::shape::Shape;
+use crate::geometry::Triangle;
+
+/// A part of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// One of the two children of a node of the face tree.
+    Half { node: u32, side: u8 },
+    /// A face of a mesh, or a part of a simple shape.
+    Face(u32),
+}
+
+/// A body in motion. Lengths are in the world's unit; places are seen from an origin that the two
+/// bodies of a pair share.
+#[derive(Clone, Debug)]
+pub struct MovingBody<'a> {
+    shape: &'a Shape,
+    placement: Placement,
+    motion: Motion,
+    origin: DVec3,
+    twist: Twist,
+    /// The parts of a simple shape.
+    simple: Vec<Vec<DVec3>>,
+    /// The surface lies within this distance of its parts.
+    pub radius: f64,
+}
+
+impl<'a> MovingBody<'a> {
+    /// A body that is where it is at time 0.
+    ///
+    /// # Errors
+    /// The motion is invalid, or the body is a plane that turns.
+    pub fn new(body: &Body<'a>, motion: Motion, origin: DVec3) -> Result<Self, CollideError> {
+        let Body { id, shape, placement } = *body;
+        let refuse = |reason| Err(CollideError::Instance { instance: id.0, reason });
+        if let Err(reason) = motion.validate() {
+            return refuse(reason);
+        }
+        let twist = motion.twist(placement.pose);
+        if twist.rotates() && matches!(shape, Shape::Plane) {
+            return refuse(
+                "a plane that turns has points of any speed; expected a motion without turning".into(),
+            );
+        }
+        let (simple, radius) = match shape {
+            Shape::Mesh(asset) => (Vec::new(), asset.half_thickness * asset.frame.inverse_scale()),
+            // A plane is the half-space of a direction, so one of its points stands for it.
+            Shape::Plane => (vec![vec![DVec3::ZERO]], 0.0),
+            shape => shape.parts(),
+        };
+        Ok(Self { shape, placement, motion, origin, twist, simple, radius: radius * placement.scale })
+    }
+
+    /// Whether it is a half-space.
+    pub fn is_plane(&self) -> bool {
+        matches!(self.shape, Shape::Plane)
+    }
+
+    /// The whole surface.
+    pub fn whole(&self) -> Part {
+        if self.simple.len() == 1 { Part::Face(0) } else { Part::Whole }
+    }
+
+    /// The parts of a part; none of a face.
+    pub fn parts_of(&self, part: Part) -> Vec<Part> {
+        let node = match (self.shape, part) {
+            (_, Part::Face(_)) => return Vec::new(),
+            (Shape::Mesh(asset), Part::Half { node, side }) => {
+                match TreeChild::decode(asset.tree_children[node as usize][usize::from(side)]) {
+                    TreeChild::Node(node) => node,
+                    TreeChild::Leaf(start, count) => return (start..start + count).map(Part::Face).collect(),
+                }
+            }
+            (Shape::Mesh(_), Part::Whole) => 0,
+            _ => return (0..self.simple.len() as u32).map(Part::Face).collect(),
+        };
+        vec![Part::Half { node, side: 0 }, Part::Half { node, side: 1 }]
+    }
+
+    /// The body at a time.
+    pub fn at(&self, time: f64) -> BodyAt<'_> {
+        let pose = self.motion.pose_at(self.placement.pose, time);
+        let Twist { drift, spin, center } = self.twist;
+        let linear = DMat3::from_quat(pose.rotation) * self.placement.scale;
+        let (shift, center) = (pose.translation - self.origin, center + time * drift - self.origin);
+        // The numbers of which places are sums.
+        let size = self.origin.length() + self.twist.center.length() + 2.0 * center.length() + shift.length();
+        BodyAt { body: self, linear, shift, drift, spin, center, size: size + time * drift.length() }
+    }
+}
+
+/// A moving body at a time.
+#[derive(Clone, Debug)]
+pub struct BodyAt<'a> {
+    body: &'a MovingBody<'a>,
+    /// A point p of the shape is at `linear` · p + `shift`.
+    linear: DMat3,
+    shift: DVec3,
+    drift: DVec3,
+    spin: DVec3,
+    /// A point of the axis of the rotation.
+    center: DVec3,
+    size: f64,
+}
+
+impl BodyAt<'_> {
+    fn place(&self, p: DVec3) -> DVec3 {
+        self.linear * p + self.shift
+    }
+
+    /// A part at the time.
+    pub fn part(&self, part: Part) -> PartAt {
+        let of_face = |corners: &[DVec3]| {
+            let mut points = [DVec3::ZERO; 3];
+            for (k, point) in points.iter_mut().enumerate() {
+                *point = self.place(corners[k.min(corners.len() - 1)]);
+            }
+            let center = points.iter().sum::<DVec3>() / 3.0;
+            PartAt { center, extent: Extent::Hull { points, count: corners.len() } }
+        };
+        let of_box = |low: DVec3, high: DVec3| {
+            let half = 0.5 * (high - low);
+            let halves = [0, 1, 2].map(|k| self.linear.col(k) * half[k]);
+            PartAt { center: self.place(0.5 * (low + high)), extent: Extent::Box { halves } }
+        };
+        match (self.body.shape, part) {
+            (Shape::Mesh(asset), Part::Half { node, side }) => {
+                let (boxes, _) = asset.tree_boxes[node as usize].as_chunks::<6>();
+                let corner = |k: usize| {
+                    let local = Vec3::from_slice(&boxes[usize::from(side)][k..]).as_dvec3();
+                    asset.frame.to_world(local + asset.cube.middle())
+                };
+                of_box(corner(0), corner(3))
+            }
+            (Shape::Mesh(asset), Part::Face(face)) => of_face(&asset.face_corners(face as usize)),
+            (Shape::Mesh(asset), Part::Whole) => {
+                let bounds = asset.bounds();
+                of_box(bounds.min, bounds.max)
+            }
+            (_, Part::Face(face)) => of_face(&self.body.simple[face as usize]),
+            (shape, _) => {
+                let bounds = shape.bounds();
+                of_box(bounds.min, bounds.max)
+            }
+        }
+    }
+
+    /// The outward direction of a plane.
+    pub fn plane_normal(&self) -> Option<DVec3> {
+        self.body.is_plane().then(|| self.linear.z_axis.normalize_or_zero())
+    }
+
+    /// Least component along `n` of the velocity of a part's points, now.
+    pub fn least_speed(&self, part: &PartAt, n: DVec3) -> f64 {
+        // n · (spin × r) = r · (n × spin)
+        let m = n.cross(self.spin);
+        if m == DVec3::ZERO {
+            return n.dot(self.drift);
+        }
+        n.dot(self.drift) + m.dot(part.center - self.center) - part.half_width(m)
+    }
+
+    /// Greatest distance of a part's points from the axis, at all times.
+    fn arm(&self, part: &PartAt) -> f64 {
+        let axis = self.spin.normalize_or_zero();
+        if axis == DVec3::ZERO {
+            0.0
+        } else {
+            (part.center - self.center).cross(axis).length() + part.reach()
+        }
+    }
+
+    /// The speed that the rotation gives a part's points at most, and the acceleration.
+    pub fn rotation(&self, part: &PartAt) -> (f64, f64) {
+        let (rate, arm) = (self.spin.length(), self.arm(part));
+        (rate * arm, rate * rate * arm)
+    }
+
+    /// Velocity of the axis.
+    pub fn drift(&self) -> DVec3 {
+        self.drift
+    }
+
+    /// Radians per unit of time.
+    pub fn rotation_rate(&self) -> f64 {
+        self.spin.length()
+    }
+
+    /// The size of the numbers of which a part's places are sums.
+    pub fn size(&self, part: &PartAt) -> f64 {
+        self.size + part.center.length() + part.reach()
+    }
+}
+
+/// A part of a surface at a time, without the radius.
+#[derive(Clone, Copy, Debug)]
+pub struct PartAt {
+    /// Its middle.
+    pub center: DVec3,
+    extent: Extent,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Extent {
+    /// All points at most these vectors from the middle.
+    Box { halves: [DVec3; 3] },
+    /// The hull of one to three points; the last one is repeated.
+    Hull { points: [DVec3; 3], count: usize },
+}
+
+impl PartAt {
+    /// How far it reaches from its middle against the direction of `m`, times the length of `m`.
+    pub fn half_width(&self, m: DVec3) -> f64 {
+        match &self.extent {
+            Extent::Box { halves } => halves.iter().map(|half| m.dot(*half).abs()).sum(),
+            Extent::Hull { points, .. } => {
+                points.iter().map(|p| m.dot(self.center - *p)).fold(f64::NEG_INFINITY, f64::max)
+            }
+        }
+    }
+
+    /// Greatest distance of a point of it from its middle.
+    pub fn reach(&self) -> f64 {
+        match &self.extent {
+            Extent::Box { halves } => halves.iter().map(|half| half.length_squared()).sum::<f64>().sqrt(),
+            Extent::Hull { points, .. } => points.iter().map(|p| p.distance(self.center)).fold(0.0, f64::max),
+        }
+    }
+
+    /// The points of a face.
+    pub fn points(&self) -> Option<&[DVec3]> {
+        match &self.extent {
+            Extent::Box { .. } => None,
+            Extent::Hull { points, count } => Some(&points[..*count]),
+        }
+    }
+
+    /// A face, whose last point is repeated where it has fewer than three.
+    pub fn triangle(&self) -> Option<Triangle> {
+        match self.extent {
+            Extent::Box { .. } => None,
+            Extent::Hull { points, .. } => Some(Triangle::new(points)),
+        }
+    }
+
+    /// Directions in which it is likely to be thin.
+    pub fn axes(&self) -> impl Iterator<Item = DVec3> {
+        let axes = match self.extent {
+            Extent::Box { halves } => halves,
+            Extent::Hull { points: [a, b, c], .. } => [(b - a).cross(c - a), DVec3::ZERO, DVec3::ZERO],
+        };
+        axes.into_iter().filter_map(DVec3::try_normalize)
+    }
+}

@@ -1,0 +1,213 @@
+//! How long two parts of moving surfaces certainly stay apart, by a plane between them. Proof:
+//! `docs/math.md`, section 17.
+use glam::DVec3;
+
+use crate::collide::time_of_impact::moving::{BodyAt, PartAt};
+use crate::geometry::polygon_to_triangle;
+
+/// What is known of two parts at a time.
+#[derive(Clone, Copy, Debug)]
+pub struct Parting {
+    /// Lower bound of their distance. Of faces, the distance.
+    pub distance: f64,
+    /// For this time, they stay farther apart than the kept distance.
+    pub free: f64,
+    /// How far points of the one can move against points of the other in this time.
+    pub way: f64,
+}
+
+/// Relative error of places and speeds, with a margin.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Two bodies at a time.
+pub struct PairAt<'a> {
+    /// The bodies. Only the second one can be a plane.
+    pub bodies: [BodyAt<'a>; 2],
+    /// The surfaces lie within this distance of their parts, both together.
+    pub radius: f64,
+    /// The time.
+    pub time: f64,
+}
+
+impl PairAt<'_> {
+    /// For how long two parts certainly stay farther apart than `kept`.
+    pub fn parting(&self, parts: &[PartAt; 2], kept: f64) -> Parting {
+        let [(speed_a, bend_a), (speed_b, bend_b)] = [0, 1].map(|k| self.bodies[k].rotation(&parts[k]));
+        let [a, b] = &self.bodies;
+        let bound = Bound {
+            speed: ((a.drift() - b.drift()).length() + speed_a + speed_b) * (1.0 + 1e-12),
+            bend: (bend_a + bend_b) * (1.0 + 1e-12),
+        };
+        let turned = self.time * (speed_a + speed_b);
+        let rounding = ROUNDING * (a.size(&parts[0]) + b.size(&parts[1]) + turned);
+        let mut found = Parting { distance: f64::NEG_INFINITY, free: 0.0, way: 0.0 };
+        let mut offer = |n: DVec3| {
+            let gap = self.gap(parts, n);
+            found.distance = found.distance.max(gap);
+            found.free = found.free.max(bound.time(gap - kept - rounding, self.closing(parts, n)));
+        };
+        if let Some(normal) = b.plane_normal() {
+            offer(normal);
+        } else {
+            let between = parts[0].center - parts[1].center;
+            for n in parts[0].axes().chain(parts[1].axes()) {
+                offer(if n.dot(between) < 0.0 { -n } else { n });
+            }
+            match least_distance(parts) {
+                Some((distance, n)) => {
+                    offer(n);
+                    found.distance = distance - self.radius;
+                }
+                None => offer(between.normalize_or_zero()),
+            }
+        }
+        found.way = bound.speed * found.free;
+        found
+    }
+
+    /// The gap between two parallel planes that `n` is perpendicular to: the first part is beyond
+    /// the one, the second part before the other.
+    fn gap(&self, parts: &[PartAt; 2], n: DVec3) -> f64 {
+        let widths = parts[0].half_width(n) + parts[1].half_width(-n);
+        n.dot(parts[0].center - parts[1].center) - widths - self.radius
+    }
+
+    /// Upper bound of the speed at which this gap closes now. Negative when it grows.
+    fn closing(&self, parts: &[PartAt; 2], n: DVec3) -> f64 {
+        let [a, b] = [0, 1].map(|k| {
+            let body = &self.bodies[k];
+            let n = if k == 0 { n } else { -n };
+            let size = body.drift().length() + body.rotation_rate() * body.size(&parts[k]);
+            ROUNDING * size - body.least_speed(&parts[k], n)
+        });
+        a + b
+    }
+}
+
+/// The distance of two faces and the direction from the second to the first. `None` for other
+/// parts.
+fn least_distance(parts: &[PartAt; 2]) -> Option<(f64, DVec3)> {
+    let [first, triangle] = [parts[0].triangle()?, parts[1].triangle()?];
+    let points = parts[0].points()?;
+    let (_, at) = polygon_to_triangle(points, first.normal, &triangle, f64::INFINITY)?;
+    let closest = triangle.closest(at);
+    Some((closest.distance, (at - closest.point).normalize_or_zero()))
+}
+
+/// Bounds of the motion of the points of one part against those of another.
+struct Bound {
+    /// Their speed at any time.
+    speed: f64,
+    /// Their acceleration.
+    bend: f64,
+}
+
+impl Bound {
+    /// For how long a gap that closes at the speed `closing` now certainly does not close.
+    fn time(&self, gap: f64, closing: f64) -> f64 {
+        if gap.is_nan() || gap <= 0.0 {
+            return 0.0;
+        }
+        // closing · t + bend / 2 · t² ≤ gap
+        let root = (closing * closing + 2.0 * self.bend * gap).sqrt();
+        let curved = if closing > 0.0 {
+            2.0 * gap / (closing + root)
+        } else if self.bend > 0.0 {
+            (root - closing) / self.bend
+        } else {
+            f64::INFINITY
+        };
+        // With a margin for rounding.
+        curved.max(gap / self.speed) * (1.0 - 1e-12)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collide::clearance::Body;
+    use crate::collide::scene::Velocity;
+    use crate::collide::scene::ids::InstanceId;
+    use crate::collide::scene::motion::Motion;
+    use crate::collide::scene::pose::{Placement, Pose};
+    use crate::collide::scene::shape::Shape;
+    use crate::collide::time_of_impact::moving::{MovingBody, Part};
+    use glam::DQuat;
+
+    fn motions() -> [Motion; 5] {
+        [
+            Motion::Rest,
+            Motion::Linear {
+                velocity: Velocity { linear: DVec3::new(1.0, -0.7, 0.4), angular: DVec3::ZERO },
+            },
+            Motion::Linear {
+                velocity: Velocity {
+                    linear: DVec3::new(-0.4, 0.2, 0.5),
+                    angular: DVec3::new(0.2, 0.7, -0.4),
+                },
+            },
+            Motion::About {
+                point: DVec3::new(1.0, 0.5, -0.3),
+                velocity: Velocity {
+                    linear: DVec3::new(0.3, -0.6, 0.1),
+                    angular: DVec3::new(-0.5, 0.4, 0.6),
+                },
+            },
+            Motion::Screw {
+                point: DVec3::new(0.0, 1.0, 0.0),
+                axis: DVec3::ONE,
+                angular_speed: 1.5,
+                pitch: 2.0,
+            },
+        ]
+    }
+
+    #[test]
+    fn parts_stay_apart_for_the_time_that_is_told() {
+        let shape = Shape::Box { half_extents: DVec3::new(1.0, 2.0, 0.5) };
+        let places = [
+            Pose { translation: DVec3::new(3.0, 0.5, 0.2), rotation: DQuat::from_rotation_y(1.1) },
+            Pose { translation: DVec3::ZERO, rotation: DQuat::from_rotation_x(0.4) },
+        ];
+        let kept = 0.01;
+        let (mut reached, mut told) = (0, 0);
+        for [a, b] in motions().into_iter().flat_map(|a| motions().map(|b| [a, b])) {
+            let [a, b] = [(0, a), (1, b)].map(|(k, motion)| {
+                let placement = Placement { pose: places[k], scale: 0.8 };
+                let body = Body { id: InstanceId(k as u32), shape: &shape, placement };
+                MovingBody::new(&body, motion, DVec3::X).expect("a motion")
+            });
+            let pair = |time: f64| PairAt { bodies: [a.at(time), b.at(time)], radius: 0.1, time };
+            for (first, second) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
+                for parts in [
+                    [Part::Face(first), Part::Face(second)],
+                    [Part::Face(first), Part::Whole],
+                    [Part::Whole, Part::Whole],
+                ] {
+                    let start = 0.2;
+                    let parting = |time: f64| {
+                        let pair = pair(time);
+                        pair.parting(&[0, 1].map(|k| pair.bodies[k].part(parts[k])), kept)
+                    };
+                    let faces = |time: f64| {
+                        let pair = pair(time);
+                        let places = [Part::Face(first), Part::Face(second)];
+                        let places = [0, 1].map(|k| pair.bodies[k].part(places[k]));
+                        least_distance(&places).expect("faces").0 - pair.radius
+                    };
+                    let Parting { free, distance, .. } = parting(start);
+                    assert!(distance <= faces(start) + 1e-12);
+                    let until = free.min(20.0);
+                    told += usize::from(free > 0.0);
+                    for k in 0..=20 {
+                        let gap = faces(start + until * f64::from(k) / 20.0);
+                        assert!(gap >= kept - 1e-12, "{parts:?} {k} of {free}: {gap}");
+                        reached += usize::from(k == 20 && free < 20.0 && gap < 4.0 * kept);
+                    }
+                }
+            }
+        }
+        // Often, it is nearly the time at which they meet.
+        assert!(told > 2000 && reached > 20, "{told} {reached}");
+    }
+}
