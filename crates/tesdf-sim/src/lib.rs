@@ -26,6 +26,7 @@
 
 pub mod criterion;
 mod dynamics;
+mod error;
 mod joint;
 mod mass;
 pub mod newton;
@@ -35,9 +36,11 @@ pub mod scene_file;
 pub mod script;
 mod simulate;
 mod system;
+mod totals;
 mod warning;
 
-pub use dynamics::{Dynamics, DynamicsError, Residual, StepReport};
+pub use dynamics::{Dynamics, Residual, StepReport};
+pub use error::DynamicsError;
 pub use joint::{Drive, Joint, JointKind, Motor};
 pub use mass::{MassError, MassProperties};
 pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};

@@ -37,6 +37,7 @@
 mod hidden;
 mod journal;
 mod origin;
+mod resume;
 mod told;
 
 use std::collections::{HashMap, TryReserveError};

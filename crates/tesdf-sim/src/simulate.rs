@@ -11,25 +11,9 @@ use crate::criterion::{
 };
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
+use crate::totals::Totals;
 use crate::warning::{Warning, Watch, energies};
-use crate::{Dynamics, DynamicsError, HiddenPair, Residual, RunRecord, State, StepReport, System};
-
-/// The state of a run after a step.
-#[derive(Clone, Copy, Debug)]
-pub struct Moment<'a> {
-    /// Number of steps so far.
-    pub step: u64,
-    /// Number of steps of the whole run.
-    pub steps: u64,
-    /// Simulated time, s.
-    pub time: f64,
-    /// Statistics of the step.
-    pub report: StepReport,
-    /// The bodies after the step.
-    pub system: &'a System,
-    /// The run so far, including this step.
-    pub record: &'a RunRecord,
-}
+use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, State, StepReport, System};
 
 /// Summary of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -90,6 +74,23 @@ pub struct Summary {
     pub assembly: Option<AssemblyReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
+}
+
+/// The state of a run after a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// Number of steps so far.
+    pub step: u64,
+    /// Number of steps of the whole run.
+    pub steps: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Statistics of the step.
+    pub report: StepReport,
+    /// The bodies after the step.
+    pub system: &'a System,
+    /// The run so far, including this step.
+    pub record: &'a RunRecord,
 }
 
 /// Why a run ended before its duration.
@@ -357,7 +358,7 @@ impl Run {
         let passed = reports.passed();
         let Reports { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly } =
             reports;
-        let sums = self.totals.summary();
+        let sums = sums(&self.totals);
         let depths = hidden.iter().map(|pair| pair.depth);
         let (momentum, angular_momentum) = system.momentum();
         let mut warnings = self.record.hidden_warnings(&hidden);
@@ -387,56 +388,20 @@ impl Run {
     }
 }
 
-/// Sums over the steps of a run.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Totals {
-    pub(crate) steps: u64,
-    contacts: usize,
-    most: usize,
-    deepest: f64,
-    iterations: u64,
-    pub(crate) unconverged: u64,
-    /// Bodies that were asleep after the last step.
-    asleep: usize,
-    /// The first step that did not converge.
-    pub(crate) first_unconverged: Option<u64>,
-    /// The greatest of these steps.
-    pub(crate) residual: Residual,
-    detection: Duration,
-    solution: Duration,
-}
-
-impl Totals {
-    pub(crate) fn add(&mut self, report: &StepReport) {
-        if !report.converged {
-            self.first_unconverged.get_or_insert(self.steps);
-        }
-        self.steps += 1;
-        self.contacts += report.contacts;
-        self.most = self.most.max(report.contacts);
-        self.deepest = self.deepest.max(-report.deepest.unwrap_or(0.0));
-        self.iterations += u64::from(report.iterations);
-        self.unconverged += u64::from(!report.converged);
-        self.residual = self.residual.max(report.residual);
-        self.asleep = report.asleep;
-        self.detection += report.detection;
-        self.solution += report.solution;
-    }
-
-    fn summary(&self) -> Summary {
-        let n = self.steps as f64;
-        let ms = |d: Duration| d.as_secs_f64() * 1e3 / n;
-        Summary {
-            steps: self.steps,
-            mean_contacts: self.contacts as f64 / n,
-            most_contacts: self.most,
-            deepest_penetration: self.deepest,
-            mean_iterations: self.iterations as f64 / n,
-            unconverged_steps: self.unconverged,
-            asleep: self.asleep,
-            detection_ms: ms(self.detection),
-            solution_ms: ms(self.solution),
-            ..Summary::default()
-        }
+/// The part of a summary that follows from the sums.
+fn sums(totals: &Totals) -> Summary {
+    let n = totals.steps as f64;
+    let ms = |d: Duration| d.as_secs_f64() * 1e3 / n;
+    Summary {
+        steps: totals.steps,
+        mean_contacts: totals.contacts as f64 / n,
+        most_contacts: totals.most,
+        deepest_penetration: totals.deepest,
+        mean_iterations: totals.iterations as f64 / n,
+        unconverged_steps: totals.unconverged,
+        asleep: totals.asleep,
+        detection_ms: ms(totals.detection),
+        solution_ms: ms(totals.solution),
+        ..Summary::default()
     }
 }

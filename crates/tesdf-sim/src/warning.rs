@@ -4,7 +4,7 @@ use tesdf::collide::{CollideError, InstancePair, PenetrationOptions, deepest_pen
 
 use crate::criterion::JointDrift;
 use crate::scene_file::{DetectorMode, SceneFile};
-use crate::simulate::Totals;
+use crate::totals::Totals;
 use crate::{HiddenPair, Mass, Residual, System};
 
 /// Joints that come farther apart than this fraction of the diagonal of their child are told.

@@ -3,72 +3,25 @@ use std::time::Instant;
 use glam::DVec3;
 use nalgebra::Vector6;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Mode, Scene, Shape,
-    instance_pairs,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Shape, instance_pairs,
 };
 
-use super::NewtonOptions;
 use super::deep::Surfaces;
 use super::gaps::Gaps;
 use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
 use super::kept::{FORGETS, Kept};
 use super::look::Look;
-use super::passing::Passing;
+use super::passing::{MOST_TURN, Passing};
 use super::rotation::Rotation;
 use super::rows::FreeBody;
 use super::sleep::Sleep;
-use super::step::Step;
+use super::step::{Step, set_velocities};
+use super::{Detect, Newton, NewtonOptions};
 use crate::dynamics::Verdict;
 use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
-/// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
-/// signature implement this trait.
-pub trait Detect: Send + Sync {
-    /// All contacts within the distances of `options`, in an order that depends on the scene alone.
-    ///
-    /// # Errors
-    /// The errors of the detection, as [`CollideError`].
-    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError>;
-
-    /// Whether contacts hold every part of a surface that comes within those distances. Where this
-    /// is so, [`Newton`] follows fast pairs by the exact distance and divides the step where one
-    /// passes; where it is not, no number of parts would hold them. And it parts deep bodies
-    /// without turning them.
-    fn holds_all(&self, options: &CollideOptions) -> bool {
-        options.mode != Mode::Node
-    }
-}
-
-impl<F> Detect for F
-where
-    F: Fn(&Scene, &CollideOptions) -> Result<Contacts, CollideError> + Send + Sync,
-{
-    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-        self(scene, options)
-    }
-}
-
-/// The built-in engine: Newton's method on a regularised convex problem of all contacts.
-pub struct Newton {
-    pub(super) system: System,
-    pub(super) detector: Box<dyn Detect>,
-    pub(super) collide: CollideOptions,
-    pub(super) options: NewtonOptions,
-    /// Diagonal of each body's bounding box, m.
-    pub(super) sizes: Vec<f64>,
-    /// For bodies that overlap deeply.
-    pub(super) surfaces: Surfaces,
-    /// What the last step found at its beginning.
-    found: Contacts,
-    pub(super) sleep: Sleep,
-    pub(super) kept: Kept,
-}
-
 /// Maximum number of further detections in a step when bodies close faster than was foreseen.
 const MORE_LOOKS: u32 = 8;
-
-/// A step is divided so that no body that may meet another one turns by more than this in a part, rad.
-pub const MOST_TURN: f64 = 1.0;
 
 /// A step has at most as many parts because bodies turn far.
 const MOST_PARTS: f64 = 1000.0;
@@ -401,13 +354,6 @@ impl Newton {
         report.deepest = self.found.iter().map(|c| c.distance).reduce(f64::min);
         report.asleep = self.end_sleep(whole, &touching)?;
         Ok(report)
-    }
-}
-
-/// Gives the free bodies these velocities.
-pub fn set_velocities(states: &mut [State], free: &[FreeBody], velocities: &[Vector6<f64>]) {
-    for (free, v) in free.iter().zip(velocities) {
-        (states[free.body].linear, states[free.body].angular) = unpack(v);
     }
 }
 

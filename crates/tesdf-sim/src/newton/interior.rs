@@ -32,7 +32,7 @@ use nalgebra::Vector6;
 
 use super::lanes::Lanes;
 use super::line::{Bodies, Bundle, Forces, Lines, Slips};
-use super::linear::Pattern;
+use super::pattern::Pattern;
 use crate::Residual;
 
 /// Bodies and the rows between them.

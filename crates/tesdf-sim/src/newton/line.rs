@@ -10,7 +10,7 @@ use glam::DVec3;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::lanes::{Lanes, WIDTH};
-use super::linear::Pattern;
+use super::pattern::Pattern;
 use super::relative::Relative;
 use super::rows::{Resistance, Row, RowForce, Stiffness};
 

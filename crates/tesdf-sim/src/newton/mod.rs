@@ -24,6 +24,10 @@
 //! With re-detection, the gaps and rows come from the predicted pose. The step is then an iteration
 //! of sequential quadratic programming on the exact distance.
 
+use tesdf::collide::{CollideError, CollideOptions, Contacts, Mode, Scene};
+
+use crate::System;
+
 mod chains;
 mod deep;
 mod engine;
@@ -43,6 +47,7 @@ mod look;
 mod normals;
 mod options;
 mod passing;
+mod pattern;
 mod problem;
 mod relative;
 mod resting;
@@ -54,5 +59,51 @@ mod solve;
 mod step;
 mod velocities;
 
-pub use engine::{Detect, Newton};
 pub use options::NewtonOptions;
+
+use deep::Surfaces;
+use kept::Kept;
+use sleep::Sleep;
+
+/// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
+/// signature implement this trait.
+pub trait Detect: Send + Sync {
+    /// All contacts within the distances of `options`, in an order that depends on the scene alone.
+    ///
+    /// # Errors
+    /// The errors of the detection, as [`CollideError`].
+    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError>;
+
+    /// Whether contacts hold every part of a surface that comes within those distances. Where this
+    /// is so, [`Newton`] follows fast pairs by the exact distance and divides the step where one
+    /// passes; where it is not, no number of parts would hold them. And it parts deep bodies
+    /// without turning them.
+    fn holds_all(&self, options: &CollideOptions) -> bool {
+        options.mode != Mode::Node
+    }
+}
+
+impl<F> Detect for F
+where
+    F: Fn(&Scene, &CollideOptions) -> Result<Contacts, CollideError> + Send + Sync,
+{
+    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
+        self(scene, options)
+    }
+}
+
+/// The built-in engine: Newton's method on a regularised convex problem of all contacts.
+pub struct Newton {
+    system: System,
+    detector: Box<dyn Detect>,
+    collide: CollideOptions,
+    options: NewtonOptions,
+    /// Diagonal of each body's bounding box, m.
+    sizes: Vec<f64>,
+    /// For bodies that overlap deeply.
+    surfaces: Surfaces,
+    /// What the last step found at its beginning.
+    found: Contacts,
+    sleep: Sleep,
+    kept: Kept,
+}

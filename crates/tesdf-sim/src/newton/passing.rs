@@ -14,10 +14,9 @@ use tesdf::collide::{
 };
 
 use super::Newton;
-use super::engine::{MOST_TURN, set_velocities};
 use super::impacts::FAR;
 use super::integrate::unpack;
-use super::step::Step;
+use super::step::{Step, set_velocities};
 use crate::{Body, DynamicsError, Mass, State};
 
 /// A fast pair ends a part at most this deep, as part of the smaller diagonal, unless it was deeper
@@ -33,6 +32,9 @@ const AT_ONCE: f64 = 0.02;
 
 /// Bodies that touch at the beginning may turn a little more than those that a step begins with.
 const TURNS: f64 = 1.5 * MOST_TURN;
+
+/// A step is divided so that no body that may meet another one turns by more than this in a part, rad.
+pub const MOST_TURN: f64 = 1.0;
 
 /// What passes in a part.
 #[derive(Clone, Copy, Debug)]

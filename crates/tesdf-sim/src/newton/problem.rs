@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::interior::{Interior, Solution};
 use super::line::{Bodies, Inverse, Lines, Placed};
-use super::linear::Pattern;
+use super::pattern::Pattern;
 use super::rows::{Resistance, RowForce, RowId};
 use crate::Residual;
 

@@ -2,7 +2,7 @@
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
-use super::linear::Pattern;
+use super::pattern::Pattern;
 
 /// The velocity of `body` relative to `other`, or to the world, at the centre of mass of `body`:
 /// `V = v − T v'` with `T (v, ω) = (v + ω × offset, ω)`.

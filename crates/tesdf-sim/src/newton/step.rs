@@ -7,7 +7,7 @@ use super::geometric::Motion;
 use super::integrate::{pack, unpack};
 use super::rotation::Rotation;
 use super::rows::{FreeBody, Row};
-use crate::StepReport;
+use crate::{State, StepReport};
 
 /// Values that are constant during a step.
 pub struct Step {
@@ -87,4 +87,11 @@ impl Step {
 /// The angular momentum that rows have given to free body `k` when its velocity is `v`.
 fn added(plain: &Motion, k: usize, v: &Vector6<f64>) -> DVec3 {
     unpack(&(plain.inertia[k] * (v - plain.target[k]))).1
+}
+
+/// Gives the free bodies these velocities.
+pub fn set_velocities(states: &mut [State], free: &[FreeBody], velocities: &[Vector6<f64>]) {
+    for (free, v) in free.iter().zip(velocities) {
+        (states[free.body].linear, states[free.body].angular) = unpack(v);
+    }
 }

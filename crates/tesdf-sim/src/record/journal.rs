@@ -29,7 +29,8 @@ use serde::{Deserialize, Serialize};
 use tesdf::save::{Destination, GrowingFile, SaveError};
 
 use super::{About, RUN_VERSION, RecordError, RunRecord, told};
-use crate::simulate::{PartialRun, Totals};
+use crate::simulate::PartialRun;
+use crate::totals::Totals;
 use crate::{Residual, RunOrigin, StepReport, Warning};
 
 const MAGIC: &[u8; 8] = b"tesdfrun";
