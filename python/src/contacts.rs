@@ -3,8 +3,10 @@ use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tesdf::collide::{
-    CoarseContact, Contact, Contacts, FeatureB, HiddenOverlap, InstanceId, PairReduction, TouchingFeatures,
+    CoarseContact, Contact, Contacts, FeatureB, FeatureId, HiddenOverlap, InstanceId, PairReduction,
+    TouchingFeatures,
 };
+use tesdf::glam::DVec3;
 
 use crate::classes;
 use crate::errors::{argument, kind_of};
@@ -238,4 +240,48 @@ pub fn coarse<'py>(py: Python<'py>, found: &[CoarseContact]) -> PyResult<Bound<'
 
 fn ids(ids: impl Iterator<Item = InstanceId>) -> impl Iterator<Item = u32> {
     ids.map(|id| id.0)
+}
+
+/// The contacts whose columns an object of `tesdf.Contacts` has.
+pub fn contacts_of(of: &Bound<'_, PyAny>) -> PyResult<Vec<Contact>> {
+    let vectors = |name| Column::<f64>::new(of, name);
+    let ids = |name| Column::<u32>::new(of, name);
+    let (point_a, point_b, normal) = (vectors("point_a")?, vectors("point_b")?, vectors("normal")?);
+    let (face_a, face_b, tet_b) = (ids("face_a")?, ids("face_b")?, ids("tet_b")?);
+    let (instance_a, instance_b) = (ids("instance_a")?, ids("instance_b")?);
+    let (feature_a, feature_b) = (ids("feature_a")?, ids("feature_b")?);
+    let (distance, kind) = (vectors("distance")?, Column::<u8>::new(of, "feature_b_kind")?);
+    let converged = Column::<bool>::new(of, "converged")?;
+    let (point_a, point_b, normal) = (point_a.rows::<3>()?, point_b.rows::<3>()?, normal.rows::<3>()?);
+    let (face_a, face_b, tet_b) = (face_a.each()?, face_b.each()?, tet_b.each()?);
+    let (instance_a, instance_b) = (instance_a.each()?, instance_b.each()?);
+    let (feature_a, feature_b) = (feature_a.each()?, feature_b.rows::<2>()?);
+    let (distance, kind, converged) = (distance.each()?, kind.each()?, converged.each()?);
+    let lengths = [point_a.len(), point_b.len(), normal.len(), face_a.len(), face_b.len(), tet_b.len()];
+    let more =
+        [instance_a.len(), instance_b.len(), feature_a.len(), feature_b.len(), kind.len(), converged.len()];
+    if lengths.iter().chain(&more).any(|&length| length != distance.len()) {
+        return Err(argument("contacts", "arrays of different lengths", "a row for each contact"));
+    }
+    let contact = |i: usize| Contact {
+        point_a: DVec3::from_array(point_a[i]),
+        point_b: DVec3::from_array(point_b[i]),
+        normal: DVec3::from_array(normal[i]),
+        distance: distance[i],
+        face_a: face_a[i],
+        face_b: face_b[i],
+        tet_b: Some(tet_b[i]).filter(|&cell| cell != NO_CELL),
+        instance_a: InstanceId(instance_a[i]),
+        instance_b: InstanceId(instance_b[i]),
+        feature: FeatureId {
+            a: feature_a[i],
+            b: match (kind[i], feature_b[i]) {
+                (0, [vertex, _]) => FeatureB::Vertex(vertex),
+                (1, [low, high]) => FeatureB::Edge(low, high),
+                (_, [face, _]) => FeatureB::Face(face),
+            },
+        },
+        converged: converged[i],
+    };
+    Ok((0..distance.len()).map(contact).collect())
 }

@@ -44,8 +44,6 @@ mod _native {
     #[pymodule_export]
     use super::mujoco::{contact_frames, fill_mujoco_contacts};
     #[pymodule_export]
-    use super::pairs::pair;
-    #[pymodule_export]
     use super::patches::PatchTracker;
     #[pymodule_export]
     use super::playback::{export, view};
@@ -53,6 +51,8 @@ mod _native {
     use super::polygons::polygons;
     #[pymodule_export]
     use super::scene::Scene;
+    #[pymodule_export]
+    use super::scene::pair;
     #[pymodule_export]
     use super::simulation::Simulation;
 

@@ -1,56 +1,21 @@
-//! Pairs of instances: a scene of two bodies, and the measures of many pairs in one call.
+//! Pairs of instances: the measures of many pairs in one call.
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use tesdf::base::unit::is_same_unit;
 use tesdf::collide::{
-    self, Clearance, ClearanceOptions, CollideError, Instance, InstanceId, Motion, Pose, Shape, TimeOfImpact,
-    TimeOfImpactOptions, clearance, time_of_impact,
+    self, Clearance, ClearanceOptions, CollideError, InstanceId, Motion, TimeOfImpact, TimeOfImpactOptions,
+    clearance, time_of_impact,
 };
 use tesdf::glam::DVec3;
 
 use crate::contacts::Columns;
 use crate::errors::{Error, argument};
 use crate::interrupt::cancellable;
-use crate::poses::Count;
-use crate::scene::Scene;
-use crate::{arrays, pool, poses, shapes};
+use crate::{arrays, pool};
 
 /// Two instances.
 pub type Ids = [InstanceId; 2];
-
-/// A scene of two bodies, as the instances 0 and 1.
-///
-/// Raises ValueError if they are assets in different units.
-#[pyfunction]
-#[pyo3(signature = (a, b, pose_a, pose_b))]
-pub fn pair(
-    py: Python<'_>,
-    a: &Bound<'_, PyAny>,
-    b: &Bound<'_, PyAny>,
-    pose_a: Option<&Bound<'_, PyAny>>,
-    pose_b: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Scene> {
-    let shapes = [shapes::shape("a", a)?, shapes::shape("b", b)?];
-    if let [Shape::Mesh(a), Shape::Mesh(b)] = &shapes
-        && let (Some(a), Some(b)) = (a.unit(), b.unit())
-        && !is_same_unit(a, b)
-    {
-        return Err(argument("b", format!("an asset in {b}, and a is in {a}"), "assets in one unit"));
-    }
-    let poses = [("pose_a", pose_a), ("pose_b", pose_b)];
-    let scene = Scene::new();
-    for (shape, (name, pose)) in shapes.into_iter().zip(poses) {
-        let pose = pose.map(|any| poses::poses(name, any, Count::One)).transpose()?;
-        let pose = pose.map_or(Pose::IDENTITY, |poses| poses[0]);
-        scene.change(py, |scene| {
-            let shape = scene.add_shape(shape)?;
-            scene.add(Instance::new(shape, pose))
-        })?;
-    }
-    Ok(scene)
-}
 
 /// Converts pairs of ids of instances.
 pub fn pairs_of(any: &Bound<'_, PyAny>) -> PyResult<Vec<Ids>> {

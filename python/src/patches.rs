@@ -3,11 +3,10 @@ use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
 use tesdf::Length;
-use tesdf::collide::{self, Contact, ContactPatches, FeatureB, FeatureId, InstanceId, PatchOptions};
-use tesdf::glam::DVec3;
+use tesdf::collide::{self, ContactPatches, PatchOptions};
 
-use crate::contacts::{Column, Columns, NO_CELL};
-use crate::errors::{Error, argument};
+use crate::contacts::{Columns, contacts_of};
+use crate::errors::Error;
 use crate::scene::Scene;
 
 /// Groups the contacts of each detection into patches: regions in which two bodies touch. Patches
@@ -55,50 +54,6 @@ impl PatchTracker {
             py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).update(&scene, &contacts));
         patches(py, contacts.len(), &found.map_err(|e| Error::Collide(e).raise(py))?)
     }
-}
-
-/// The contacts whose columns an object of `tesdf.Contacts` has.
-pub fn contacts_of(of: &Bound<'_, PyAny>) -> PyResult<Vec<Contact>> {
-    let vectors = |name| Column::<f64>::new(of, name);
-    let ids = |name| Column::<u32>::new(of, name);
-    let (point_a, point_b, normal) = (vectors("point_a")?, vectors("point_b")?, vectors("normal")?);
-    let (face_a, face_b, tet_b) = (ids("face_a")?, ids("face_b")?, ids("tet_b")?);
-    let (instance_a, instance_b) = (ids("instance_a")?, ids("instance_b")?);
-    let (feature_a, feature_b) = (ids("feature_a")?, ids("feature_b")?);
-    let (distance, kind) = (vectors("distance")?, Column::<u8>::new(of, "feature_b_kind")?);
-    let converged = Column::<bool>::new(of, "converged")?;
-    let (point_a, point_b, normal) = (point_a.rows::<3>()?, point_b.rows::<3>()?, normal.rows::<3>()?);
-    let (face_a, face_b, tet_b) = (face_a.each()?, face_b.each()?, tet_b.each()?);
-    let (instance_a, instance_b) = (instance_a.each()?, instance_b.each()?);
-    let (feature_a, feature_b) = (feature_a.each()?, feature_b.rows::<2>()?);
-    let (distance, kind, converged) = (distance.each()?, kind.each()?, converged.each()?);
-    let lengths = [point_a.len(), point_b.len(), normal.len(), face_a.len(), face_b.len(), tet_b.len()];
-    let more =
-        [instance_a.len(), instance_b.len(), feature_a.len(), feature_b.len(), kind.len(), converged.len()];
-    if lengths.iter().chain(&more).any(|&length| length != distance.len()) {
-        return Err(argument("contacts", "arrays of different lengths", "a row for each contact"));
-    }
-    let contact = |i: usize| Contact {
-        point_a: DVec3::from_array(point_a[i]),
-        point_b: DVec3::from_array(point_b[i]),
-        normal: DVec3::from_array(normal[i]),
-        distance: distance[i],
-        face_a: face_a[i],
-        face_b: face_b[i],
-        tet_b: Some(tet_b[i]).filter(|&cell| cell != NO_CELL),
-        instance_a: InstanceId(instance_a[i]),
-        instance_b: InstanceId(instance_b[i]),
-        feature: FeatureId {
-            a: feature_a[i],
-            b: match (kind[i], feature_b[i]) {
-                (0, [vertex, _]) => FeatureB::Vertex(vertex),
-                (1, [low, high]) => FeatureB::Edge(low, high),
-                (_, [face, _]) => FeatureB::Face(face),
-            },
-        },
-        converged: converged[i],
-    };
-    Ok((0..distance.len()).map(contact).collect())
 }
 
 /// An object of `tesdf.ContactPatches`.

@@ -5,20 +5,20 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tesdf::base::unit::is_same_unit;
 use tesdf::collide::{
-    self, ClearanceOptions, CollideError, ContactsPer, Instance, InstanceId, Pose, ShapeId,
+    self, ClearanceOptions, CollideError, ContactsPer, Instance, InstanceId, Pose, Shape, ShapeId,
     TimeOfImpactOptions, clearance, coarse_contacts, detect_until, time_of_impact, why,
 };
 
 use crate::arrays;
-use crate::contacts::{self, Columns};
+use crate::contacts::{self, Columns, contacts_of};
 use crate::detection::{self, Keywords};
 use crate::device::{self, HeldDetector};
 use crate::errors::{Error, argument};
 use crate::given::{Given, PerInstance};
 use crate::interrupt::cancellable;
 use crate::pairs::{self, Motions, pairs_of};
-use crate::patches::contacts_of;
 use crate::poses::{self, Count};
 use crate::{classes, pool, shapes};
 
@@ -525,4 +525,36 @@ impl Scene {
         let scene = self.now();
         format!("<tesdf.Scene: {} instances of {} shapes>", scene.instances().len(), scene.shapes().len())
     }
+}
+
+/// A scene of two bodies, as the instances 0 and 1.
+///
+/// Raises ValueError if they are assets in different units.
+#[pyfunction]
+#[pyo3(signature = (a, b, pose_a, pose_b))]
+pub fn pair(
+    py: Python<'_>,
+    a: &Bound<'_, PyAny>,
+    b: &Bound<'_, PyAny>,
+    pose_a: Option<&Bound<'_, PyAny>>,
+    pose_b: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Scene> {
+    let shapes = [shapes::shape("a", a)?, shapes::shape("b", b)?];
+    if let [Shape::Mesh(a), Shape::Mesh(b)] = &shapes
+        && let (Some(a), Some(b)) = (a.unit(), b.unit())
+        && !is_same_unit(a, b)
+    {
+        return Err(argument("b", format!("an asset in {b}, and a is in {a}"), "assets in one unit"));
+    }
+    let poses = [("pose_a", pose_a), ("pose_b", pose_b)];
+    let scene = Scene::new();
+    for (shape, (name, pose)) in shapes.into_iter().zip(poses) {
+        let pose = pose.map(|any| poses::poses(name, any, Count::One)).transpose()?;
+        let pose = pose.map_or(Pose::IDENTITY, |poses| poses[0]);
+        scene.change(py, |scene| {
+            let shape = scene.add_shape(shape)?;
+            scene.add(Instance::new(shape, pose))
+        })?;
+    }
+    Ok(scene)
 }

@@ -1,17 +1,15 @@
 //! `tesdf encode MESH -o FILE`: encodes a mesh.
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::asset::about::{Repair, Source, Statistics};
-use tesdf::base::{Inside, unit};
+use tesdf::base::unit;
 use tesdf::domain::tetrahedra_files;
-use tesdf::encode::{Domain, DomainChoice, EncodeChoices, EncodeOptions, Encoder, Method};
-use tesdf::mesh::{
-    AutoRepaired, Defect, LoadReport, LoadedMesh, NotSolid, RepairReport, Severity, SolidMesh, TriangleMesh,
-};
+use tesdf::encode::{DomainChoice, EncodeOptions, Encoder, Method};
+use tesdf::mesh::{Defect, LoadReport, LoadedMesh, RepairReport, Severity};
 use tesdf::{Certificate, Progress, TeSdf};
 
 use tesdf_terminal::device::{self, Choice};
@@ -21,13 +19,14 @@ use tesdf_terminal::output::Consent;
 use tesdf_terminal::progress::{interrupt_flag, watched};
 use tesdf_terminal::report::{self, Failure, Outcome};
 
-mod choices;
+pub(crate) mod choices;
 mod robot;
 mod split;
 
 use crate::encode_all::Batch;
 use crate::encode_all::meshes::Mesh;
 pub use choices::{ChoiceArgs, EncoderChoice, Preset, RepairChoice};
+use choices::{encode, solid};
 
 const ENCODED_HELP: &str = "Mesh file: STL, OBJ, PLY, OFF, glTF, GLB, 3MF, or STEP, IGES, BREP by the program Gmsh; or a \
                             robot description, URDF or MJCF, whose collision meshes are all encoded";
@@ -165,39 +164,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let repair = repaired.as_ref().map(|found| &found.repaired.report);
     print(args, &Before { load: &load, warnings: solid.warnings(), repair }, &asset, seconds)?;
     Ok(Outcome::Good)
-}
-
-/// The solid of a mesh, and the changes if it was repaired.
-///
-/// # Errors
-/// The mesh has no well-defined inside, and no repair was asked for or none works.
-pub(crate) fn solid(
-    mesh: TriangleMesh,
-    inside: Inside,
-    repair: Option<RepairChoice>,
-) -> Result<(SolidMesh, Option<AutoRepaired>), NotSolid> {
-    match repair {
-        None => Ok((SolidMesh::with_inside(mesh, inside)?, None)),
-        Some(RepairChoice::Auto) => SolidMesh::repaired(mesh, inside),
-    }
-}
-
-/// Encodes the solid of the mesh file `path` in the domain of `choices`. The error message names
-/// the file.
-///
-/// # Errors
-/// Gmsh or the file of tetrahedra gives no domain, an option does not apply to the solid, or
-/// `progress` was cancelled.
-pub(crate) fn encode(
-    solid: &SolidMesh,
-    path: &Path,
-    choices: &EncodeChoices,
-    encoder: Encoder<'_>,
-    progress: &Progress,
-) -> Result<TeSdf, Failure> {
-    let tetrahedra = choices.tetrahedra(solid, progress).map_err(Failure::new)?;
-    let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
-    encoder.domain(domain).encode(solid).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
 }
 
 impl Args {

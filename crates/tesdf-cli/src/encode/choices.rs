@@ -1,11 +1,17 @@
 //! The options of the encoder, which `encode` and `encode-all` share.
 use std::num::NonZeroU32;
+use std::path::Path;
 
 use clap::ValueEnum;
-use tesdf::base::SurfaceFaces;
-use tesdf::encode::{Deformation, DomainChoice, EncodeChoices, Refinement, RuleChoice, Threshold};
+use tesdf::base::{Inside, SurfaceFaces};
+use tesdf::encode::{
+    Deformation, Domain, DomainChoice, EncodeChoices, Encoder, Refinement, RuleChoice, Threshold,
+};
 use tesdf::geometry::Aabb;
+use tesdf::mesh::{AutoRepaired, NotSolid, SolidMesh, TriangleMesh};
+use tesdf::{Progress, TeSdf};
 use tesdf_terminal::parse;
+use tesdf_terminal::report::Failure;
 
 /// The options of the encoder.
 #[derive(clap::Args, Debug)]
@@ -201,4 +207,37 @@ pub fn threshold(text: &str) -> Result<Threshold, String> {
         "safe" => Ok(Threshold::CoveringRadius),
         _ => parse::length(text).map(Threshold::Absolute),
     }
+}
+
+/// The solid of a mesh, and the changes if it was repaired.
+///
+/// # Errors
+/// The mesh has no well-defined inside, and no repair was asked for or none works.
+pub(crate) fn solid(
+    mesh: TriangleMesh,
+    inside: Inside,
+    repair: Option<RepairChoice>,
+) -> Result<(SolidMesh, Option<AutoRepaired>), NotSolid> {
+    match repair {
+        None => Ok((SolidMesh::with_inside(mesh, inside)?, None)),
+        Some(RepairChoice::Auto) => SolidMesh::repaired(mesh, inside),
+    }
+}
+
+/// Encodes the solid of the mesh file `path` in the domain of `choices`. The error message names
+/// the file.
+///
+/// # Errors
+/// Gmsh or the file of tetrahedra gives no domain, an option does not apply to the solid, or
+/// `progress` was cancelled.
+pub(crate) fn encode(
+    solid: &SolidMesh,
+    path: &Path,
+    choices: &EncodeChoices,
+    encoder: Encoder<'_>,
+    progress: &Progress,
+) -> Result<TeSdf, Failure> {
+    let tetrahedra = choices.tetrahedra(solid, progress).map_err(Failure::new)?;
+    let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
+    encoder.domain(domain).encode(solid).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
 }

@@ -14,7 +14,7 @@ use tesdf::save::save_atomic;
 use tesdf::{Certificate, Progress, TeSdf};
 
 use super::meshes::{Content, Mesh, Placed};
-use crate::encode::{ChoiceArgs, RepairChoice, encode, solid};
+use crate::encode::choices::{ChoiceArgs, RepairChoice, encode, solid};
 use tesdf_terminal::asset_file;
 use tesdf_terminal::mesh_file::{self, CadArgs};
 use tesdf_terminal::report::Failure;

@@ -22,7 +22,7 @@ use serde::Serialize;
 use tesdf::Progress;
 use tesdf::encode::DomainChoice;
 
-use crate::encode::ChoiceArgs;
+use crate::encode::choices::ChoiceArgs;
 use job::{Done, Job, State};
 use manifest::{Manifest, Times};
 use meshes::Mesh;
