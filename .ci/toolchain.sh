@@ -15,8 +15,8 @@ if ! command -v cc >/dev/null; then
     exit 2
 fi
 
-# The features that are off by default and that tests need.
-features="--features tesdf-cli/bench,tesdf-cli/gpu,tesdf-bench/peers"
+# The feature that is off by default and that tests need.
+features="--features tesdf-cli/gpu"
 
 # Prints a command, then runs it. Where STEP_TIMES names a file, adds a line to it: the name of the
 # step, its seconds, and the seconds of all processors that it used.

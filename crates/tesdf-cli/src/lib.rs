@@ -22,7 +22,6 @@ pub mod encode;
 pub mod encode_all;
 pub mod export;
 pub mod inspect;
-pub mod measure;
 mod open_run;
 pub mod part;
 pub mod query;
@@ -78,8 +77,6 @@ pub enum Command {
     Toi(Box<toi::Args>),
     /// List the compute devices, with the numbers and names for --device
     Devices(devices::Args),
-    /// Measure the cost of a detection on a device, stage by stage
-    Bench(measure::BenchArgs),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
     /// Simulate the bodies of a scene and write the run
@@ -90,8 +87,6 @@ pub enum Command {
     View(view::Args),
     /// Write a run as an animated GLB file, for Blender, three.js and others
     Export(export::Args),
-    /// Measure Table I or IV of the paper, next to the paper's figures
-    Evaluate(measure::EvaluateArgs),
     /// Print a completion script for a shell
     Completions(completions::Args),
 }
@@ -135,13 +130,11 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Clearance(args) => clearance::run(args),
         Command::Toi(args) => toi::run(args),
         Command::Devices(args) => devices::run(args),
-        Command::Bench(args) => measure::bench(args),
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),
         Command::View(args) => view::run(args),
         Command::Export(args) => export::run(args),
-        Command::Evaluate(args) => measure::evaluate(args),
         Command::Completions(args) => completions::run(args),
     }
 }

@@ -15,7 +15,6 @@ pub(crate) mod ticks;
 use std::path::PathBuf;
 
 use tesdf::asset::CellKind;
-use tesdf::evaluate::EvaluateOptions;
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
 
@@ -100,7 +99,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             let exact = asset.query_by_tree(p).signed_distance;
             Some(Deviation { exact, error: (found - exact).abs() })
         };
-        let tolerance = EvaluateOptions::default().exact * asset.bounds().extent().length();
+        let tolerance = EXACT * asset.bounds().extent().length();
         draw_error(&view, &overlay, args.size, tolerance, deviation)
     } else {
         draw(&view, &overlay, args.size, |p| asset.signed_distance_f32(p))
@@ -109,6 +108,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     output::write(&output, &png)?;
     Ok(Outcome::Good)
 }
+
+/// Errors up to this fraction of the diagonal count as zero.
+const EXACT: f64 = 1e-6;
 
 /// Position of a cell relative to the solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

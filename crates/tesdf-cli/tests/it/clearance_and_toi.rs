@@ -217,27 +217,3 @@ fn why_explains_found_and_missing_contacts() {
     let (code, _, error) = folder.tesdf(&[&apart[..], &["1:99"]].concat());
     assert!(code == Some(2) && error.contains("face is 99 (of 12)"), "{error}");
 }
-
-#[test]
-fn benchmarks_of_clearances_and_pairs_print_their_figures() {
-    let folder = cube();
-    let pairs = json(&folder, &["bench", "clearance", "c.tesdf", "c.obj", "--pairs", "3", "--json"]);
-    let pairs = pairs.as_array().unwrap();
-    assert_eq!(pairs.len(), 3);
-    for pair in pairs {
-        assert!(pair["distance"].as_f64() < Some(0.0) && pair["converged"] == true, "{pair}");
-        assert!(pair["lower_bound"].as_f64() <= pair["distance"].as_f64(), "{pair}");
-    }
-    let text = folder.good(&["bench", "clearance", "c.tesdf", "--pairs", "3"]);
-    assert!(text.contains("3 pairs, 3 overlap, 0 not converged"), "{text}");
-    let text = folder.good(&["bench", "heap", "--bodies", "20", "--steps", "2"]);
-    assert_eq!(text.lines().filter(|line| line.starts_with("| 20 |")).count(), 4, "{text}");
-    let poses = [[0.5, 0.5, 1.5, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0]];
-    let bytes: Vec<u8> = poses.as_flattened().iter().flat_map(|x: &f64| x.to_le_bytes()).collect();
-    folder.write("poses", &bytes);
-    let worlds = json(&folder, &["bench", "worlds", "c.tesdf", "c.tesdf", "--poses", "poses"]);
-    assert!(worlds["contacts"].as_u64() > Some(0) && worlds["least"].as_f64() < Some(0.0), "{worlds}");
-    folder.write("poses", &bytes[1..]);
-    let (code, _, error) = folder.tesdf(&["bench", "worlds", "c.tesdf", "c.tesdf", "--poses", "poses"]);
-    assert!(code == Some(2) && error.contains("111 bytes; expected a multiple of 56"), "{error}");
-}

@@ -1,4 +1,4 @@
-//! `tesdf devices`, `--device` and `tesdf bench`. These tests run on the software driver and fail
+//! `tesdf devices` and `--device`. These tests run on the software driver and fail
 //! without a device.
 
 use std::path::Path;
@@ -85,59 +85,4 @@ fn a_run_on_a_device_agrees_with_the_processor() {
         // The bodies have a size of 20 mm. No contact holds them sideways, and they stay in place.
         assert!(h.distance(d) < 1e-8, "body {body}: {d} instead of {h}");
     }
-}
-
-#[test]
-fn a_benchmark_reports_its_worlds_frames_and_stages() {
-    let folder = Folder::new();
-    let poses = format!(
-        r#"{{"tesdf_poses": 1, "contact_distance": 1e-3, "bodies": ["{0}", "{0}"], "instances": [[0, 0], [1, 0]],
-            "frames": [[[0, 0, 0, 0, 0, 0, 1], [0.011, 0, 0, 0, 0, 0, 1]], [[0, 0, 0, 0, 0, 0, 1], [0.013, 0, 0, 0, 0, 0, 1]]]}}"#,
-        data("cube.obj")
-    );
-    folder.write("poses.json", poses);
-    let more = ["--worlds", "3", "--repeat", "1", "--against-cpu", "--json"];
-    let report = json(&folder.good(&[&["bench", "collide", "poses.json"], &more[..]].concat()));
-    assert_eq!(
-        (&report["worlds"], &report["instances"], &report["frames"]),
-        (&3.into(), &6.into(), &2.into())
-    );
-    assert_eq!(report["counts"]["directions"]["mean"], 6.0);
-    assert!(report["counts"]["contacts"]["mean"].as_f64() > Some(10.0), "{report}");
-    assert!(
-        report["counts"]["queries"]["mean"].as_f64() <= report["counts"]["queries_unpruned"]["mean"].as_f64()
-    );
-    let stages = report["stages"].as_array().expect("stages");
-    assert_eq!(report["launches"].as_u64(), Some(stages.len() as u64));
-    assert!(report["cpu_over_device"].as_f64() > Some(0.0));
-    let text = folder.good(&["bench", "collide", "poses.json", "--repeat", "1", "--mode", "node"]);
-    assert!(text.contains("BP / MP / NP") && text.contains("without pruning"), "{text}");
-
-    for mode in ["node", "exact"] {
-        let few =
-            ["bench", "collide", "poses.json", "--repeat", "1", "--mode", mode, "--reduce", "4", "--json"];
-        let report = json(&folder.good(&few));
-        let counts = &report["counts"];
-        assert!(counts["kept"]["max"].as_f64() <= Some(4.0), "{counts}");
-        assert!(counts["contacts"]["mean"].as_f64() > counts["kept"]["mean"].as_f64(), "{counts}");
-        let bytes = &report["bytes"];
-        let buffers = bytes["products_by_buffer"].as_array().expect("buffers").iter();
-        let products: u64 = buffers.map(|b| b[1].as_u64().expect("bytes")).sum();
-        assert_eq!(bytes["products"].as_u64(), Some(products));
-        let shapes =
-            ["shapes_table", "shapes_words", "shapes_rows"].map(|k| bytes[k].as_u64().expect("bytes"));
-        let instances = 2 * bytes["per_instance"].as_u64().expect("bytes");
-        assert_eq!(bytes["total"].as_u64(), Some(products + shapes.iter().sum::<u64>() + instances));
-    }
-
-    folder.good(&["bench", "poses", "shafts", "--frames", "2", "-o", "shafts.json"]);
-    let shafts = json(&std::fs::read_to_string(folder.path("shafts.json")).expect("a file"));
-    assert_eq!(shafts["frames"][1].as_array().map(Vec::len), Some(128));
-    folder.write(
-        "bad.json",
-        r#"{"tesdf_poses": 7, "contact_distance": 0, "bodies": [], "instances": [], "frames": []}"#,
-    );
-    let (code, _, err) = folder.tesdf(&["bench", "collide", "bad.json"]);
-    assert_eq!(code, Some(2));
-    assert!(err.contains("version 7; this build reads 1"), "{err}");
 }

@@ -99,33 +99,9 @@ fn options_that_ask_for_too_much_are_bad_usage() {
     for (args, expected) in [
         (&["verify", "f.tesdf", "--samples", "0"][..], "invalid value '0' for '--samples <N>'"),
         (&["encode", "m.stl", "-o", "f", "--threads", "1000000000"], "--threads <N>"),
-        (&["bench", "poses", "shafts", "-o", "p.json", "--frames", "1000000000"], "--frames <N>"),
-        (&["bench", "collide", "s.toml", "--repeat", "1000000000"], "--repeat <N>"),
     ] {
         let (code, out, err) = folder.tesdf(args);
         assert_eq!((code, out.as_str()), (Some(2), ""), "{args:?}: {err}");
         assert!(err.contains(expected), "{args:?}: {err}");
     }
-    folder.write("s.toml", DROP);
-    let (code, _, err) =
-        folder.tesdf(&["bench", "collide", "s.toml", "--device", "cpu", "--worlds", "4000000000"]);
-    assert!(code == Some(2) && err.contains("--worlds 4000000000 makes 8000000000 instances"), "{err}");
-}
-
-#[test]
-fn a_file_of_poses_is_bounded() {
-    let folder = Folder::new();
-    let instances = vec!["[0,0]"; 65_537].join(",");
-    let poses = |instances: &str| {
-        format!(
-            r#"{{"tesdf_poses":1,"contact_distance":0.0,"bodies":[],"instances":[{instances}],"frames":[]}}"#
-        )
-    };
-    folder.write("p.json", poses(&instances));
-    let (code, _, err) = folder.tesdf(&["bench", "collide", "p.json", "--device", "cpu"]);
-    assert!(
-        code == Some(2) && err.contains("0 bodies, 65537 instances; expected at most 65536 each"),
-        "{err}"
-    );
-    assert!(err.ends_with("hint: `tesdf bench poses` writes files of poses\n"), "{err}");
 }

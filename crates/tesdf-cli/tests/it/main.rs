@@ -8,7 +8,6 @@ mod conforming_domains;
 mod devices;
 mod encode_all;
 mod encode_query_verify;
-mod evaluate;
 mod folder;
 mod inside;
 #[cfg(unix)]

@@ -72,16 +72,11 @@ fn an_input_is_never_the_output() {
         folder.write(name, "precious");
     }
     folder.write("m.gltf", GLTF);
-    fs::create_dir_all(folder.path("data/procedural")).unwrap();
-    fs::create_dir(folder.path("tables")).unwrap();
-    for name in ["data/iso_m16_nut_c50.obj", "data/procedural/shaft_keyway.obj"] {
-        folder.write(name, "precious");
-    }
     let cut = crate::folder::interrupted_run(&folder, "scene.toml", 4);
     folder.write("cut.tesrun", cut);
     let encode = ["encode", "cube.obj"];
     let of_run = ["render", "--run", "run.tesrun"];
-    let cases: [(&[&str], &str); 18] = [
+    let cases: [(&[&str], &str); 17] = [
         (&encode, "cube.obj"),
         (&["encode", "cube.obj", "--domain", "t.msh"], "t.msh"),
         (&["encode", "cube.obj", "--domain", "t.node"], "t.node"),
@@ -98,7 +93,6 @@ fn an_input_is_never_the_output() {
         (&["simulate", "scene.toml"], "cube.obj"),
         (&["simulate", "scene.toml", "--geometry", "cube=b.tesdf"], "b.tesdf"),
         (&["simulate", "--resume", "cut.tesrun"], "cube.obj"),
-        (&["bench", "poses", "bolt-nut", "--data", "data"], "data/iso_m16_nut_c50.obj"),
         (&["render", "--run", "cut.tesrun"], "cut.tesrun"),
     ];
     for (command, input) in cases {
@@ -118,26 +112,15 @@ fn an_input_is_never_the_output() {
         assert!(snapshot(&folder.path("")) == before, "{command:?} changed a file");
         [hard, soft].iter().for_each(|name| fs::remove_file(folder.path(name)).unwrap());
     }
-    // The files of a table have fixed names.
-    let [mesh, table] =
-        ["data/procedural/shaft_keyway.obj", "tables/table4.csv"].map(|name| folder.path(name));
-    fs::hard_link(&mesh, &table).unwrap();
-    let (code, _, err) = folder.tesdf(&["evaluate", "table4", "--quick", "--data", "data", "-o", "tables"]);
-    assert!(
-        code == Some(2) && err.contains("table4.csv is the input data/procedural/shaft_keyway.obj"),
-        "{err}"
-    );
-    assert_eq!(fs::read(mesh).unwrap(), b"precious");
 }
 
 /// All commands that write one file, without `-o`, each with a file name.
-const WRITERS: [(&[&str], &str); 6] = [
+const WRITERS: [(&[&str], &str); 5] = [
     (&["encode", "cube.obj", "--preset", "fast"], "out.tesdf"),
     (&["repair", "cube.obj"], "out.ply"),
     (&["slice", "a.tesdf", "--size", "256"], "out.png"),
     (&["render", "a.tesdf", "--size", "32x32"], "out.png"),
     (&["simulate", "scene.toml"], "out.tesrun"),
-    (&["bench", "poses", "bolt-nut", "--frames", "1"], "out.json"),
 ];
 
 #[test]

@@ -33,7 +33,7 @@ const HEAD: &str = "#define fma(a, b, c) ((a) * (b) + (c))
 
 /// Kernels for which a bound on registers pays: the start of the function's name, and the least
 /// number of resident blocks per multiprocessor. The compiler then spills registers to memory. Most
-/// spilled values are read only after the loops; `tesdf bench kernels`
+/// spilled values are read only after the loops; `tesdf-lab kernels`
 /// prints the number of spilled bytes.
 const BLOCKS: [(&str, u32); 2] = [("narrow_faces_", 24), ("narrow_exact_", 20)];
 

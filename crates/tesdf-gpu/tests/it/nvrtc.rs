@@ -3,7 +3,7 @@ use tesdf_gpu::cuda::{Resources, compile};
 
 use crate::cuda_source::SOURCES;
 
-/// Compiles to machine code for GPUs of compute centers. `tesdf bench kernels` prints its
+/// Compiles to machine code for GPUs of compute centers. `tesdf-lab kernels` prints its
 /// resources.
 #[test]
 #[ignore = "needs NVRTC: .ci/kernels.sh runs it"]

@@ -49,13 +49,30 @@ mod sign;
 #[cfg(feature = "collide")]
 mod surroundings;
 
-/// Constants that the kernels of `tesdf-gpu` share with this crate. Not part of the API.
+/// Constants that the kernels of `tesdf-gpu` share with this crate, and what its laboratory reads. Not
+/// part of the API.
 #[doc(hidden)]
 pub mod internal {
+    use glam::DVec3;
+
+    use super::Place;
+    use crate::TeSdf;
+
     pub use super::kernel::PART;
     pub use super::polygon::ROUNDING as POLYGON_ROUNDING;
     /// Below this distance, the gradient is the normal of the nearest face.
     pub const ON_SURFACE: f64 = super::ON_SURFACE_F32;
+
+    /// The cell of a point, by its [id](crate::asset::CellView::id), and whether the cell has a list. `None`
+    /// outside the domain.
+    pub fn cell_at(asset: &TeSdf, point: DVec3) -> Option<(u32, bool)> {
+        let (place, word) = asset.locate_with_word(asset.frame.to_local(point));
+        match place {
+            Place::NotOfDomain => None,
+            Place::Listed { .. } => Some((word as u32, true)),
+            Place::Far(_) => Some((word as u32, false)),
+        }
+    }
 }
 
 use std::cell::RefCell;

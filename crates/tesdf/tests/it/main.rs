@@ -22,7 +22,6 @@ mod documents;
 mod encode_contract;
 mod encoders;
 mod entry;
-mod evaluate;
 mod exactness;
 mod examples;
 mod fans_and_needles;

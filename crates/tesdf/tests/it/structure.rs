@@ -5,9 +5,9 @@ use std::fs;
 use std::path::Path;
 
 /// The order of the modules, as in `docs/architecture.md` and in the documentation of the crate.
-const ORDER: [&str; 17] = [
+const ORDER: [&str; 16] = [
     "base", "parallel", "input", "save", "program", "geometry", "sampling", "mesh", "domain", "asset",
-    "query", "verify", "encode", "deform", "collide", "evaluate", "inspect",
+    "query", "verify", "encode", "deform", "collide", "inspect",
 ];
 /// The order of the folders and files of `collide`.
 const ORDER_OF_COLLIDE: [&str; 11] = [
