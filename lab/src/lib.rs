@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use tesdf::base::Isa;
-use tesdf_terminal::report;
+use tesdf_cli::terminal::report;
 
 pub mod benchmarks;
 pub mod detection;

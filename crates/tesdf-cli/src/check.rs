@@ -5,8 +5,8 @@ use serde::Serialize;
 use tesdf::base::InsideRule;
 use tesdf::mesh::{CheckReport, DefectKind, LoadReport, TriangleMesh, check, other_rules, repair_auto};
 
-use tesdf_terminal::mesh_file::{self, CadArgs};
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::mesh_file::{self, CadArgs};
+use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf check`.
 #[derive(clap::Args, Debug)]

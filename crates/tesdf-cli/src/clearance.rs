@@ -3,8 +3,8 @@ use tesdf::Length;
 use tesdf::collide::{Clearance, ClearanceOptions, InstanceId, clearance};
 
 use crate::collide::Bodies;
-use tesdf_terminal::parse;
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::parse;
+use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf clearance`.
 #[derive(clap::Args, Debug)]

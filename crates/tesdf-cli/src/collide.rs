@@ -13,11 +13,11 @@ use tesdf::{Length, TeSdf};
 
 use tesdf_sim::newton::Detect as _;
 
+use crate::terminal::asset_file::{Assets, check_units};
+use crate::terminal::device::{self, Choice};
+use crate::terminal::parse;
+use crate::terminal::report::{self, Failure, Outcome, count};
 use crate::why;
-use tesdf_terminal::asset_file::{Assets, check_units};
-use tesdf_terminal::device::{self, Choice};
-use tesdf_terminal::parse;
-use tesdf_terminal::report::{self, Failure, Outcome, count};
 
 /// Two posed bodies. Several commands share these arguments.
 #[derive(clap::Args, Debug)]

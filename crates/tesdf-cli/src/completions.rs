@@ -2,7 +2,7 @@
 use clap::CommandFactory;
 use clap_complete::Shell;
 
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf completions`.
 #[derive(clap::Args, Debug)]

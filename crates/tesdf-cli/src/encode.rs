@@ -12,12 +12,12 @@ use tesdf::encode::{DomainChoice, EncodeOptions, Encoder, Method};
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, RepairReport, Severity};
 use tesdf::{Certificate, Progress, TeSdf};
 
-use tesdf_terminal::device::{self, Choice};
-use tesdf_terminal::mesh_file::CadArgs;
-use tesdf_terminal::output;
-use tesdf_terminal::output::Consent;
-use tesdf_terminal::progress::{interrupt_flag, watched};
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::device::{self, Choice};
+use crate::terminal::mesh_file::CadArgs;
+use crate::terminal::output;
+use crate::terminal::output::Consent;
+use crate::terminal::progress::{interrupt_flag, watched};
+use crate::terminal::report::{self, Failure, Outcome};
 
 pub(crate) mod choices;
 mod robot;

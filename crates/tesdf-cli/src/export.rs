@@ -2,11 +2,11 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use crate::terminal::output::{self, Consent};
+use crate::terminal::parse;
+use crate::terminal::progress::interrupt_flag;
+use crate::terminal::report::{self, Failure, Outcome};
 use tesdf_playback::{Frames, GlbOptions, Playback, glb};
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::parse;
-use tesdf_terminal::progress::interrupt_flag;
-use tesdf_terminal::report::{self, Failure, Outcome};
 
 use crate::open_run::{self, OpenRun};
 

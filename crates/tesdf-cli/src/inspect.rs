@@ -7,8 +7,8 @@ use tesdf::encode::EncodeOptions;
 use tesdf::inspect::{InspectOptions, Inspection, inspect};
 use tesdf::{Certificate, Length};
 
-use tesdf_terminal::asset_file;
-use tesdf_terminal::report::{self, Failure, Outcome, count, size};
+use crate::terminal::asset_file;
+use crate::terminal::report::{self, Failure, Outcome, count, size};
 
 /// Arguments of `tesdf inspect`.
 #[derive(clap::Args, Debug)]

@@ -29,12 +29,13 @@ pub mod render;
 pub mod repair;
 pub mod simulate;
 pub mod slice;
+pub mod terminal;
 pub mod toi;
 pub mod verify;
 pub mod view;
 pub mod why;
 
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::report::{self, Failure, Outcome};
 
 /// Exact signed distances of triangle meshes.
 #[derive(Parser, Debug)]

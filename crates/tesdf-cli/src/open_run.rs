@@ -2,14 +2,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use crate::terminal::output::{self, Consent};
+use crate::terminal::progress::watched;
+use crate::terminal::report::Failure;
+use crate::terminal::run_file;
 use tesdf::Progress;
 use tesdf::save::Destination;
 use tesdf_sim::scene_file::{LoadedScene, SceneError};
 use tesdf_sim::{RunRecord, System};
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::progress::watched;
-use tesdf_terminal::report::Failure;
-use tesdf_terminal::run_file;
 
 use crate::simulate::replace_geometries;
 

@@ -7,10 +7,10 @@ use tesdf::mesh::{
     WriteFormat, check, closing_tolerance, files, read_bytes, repair, repair_auto, write_bytes,
 };
 
-use tesdf_terminal::mesh_file::{self, CadArgs};
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::parse;
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::mesh_file::{self, CadArgs};
+use crate::terminal::output::{self, Consent};
+use crate::terminal::parse;
+use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf repair`.
 #[derive(clap::Args, Debug)]

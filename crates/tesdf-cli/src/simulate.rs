@@ -13,11 +13,11 @@ use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
 use crate::collide::warn_of_coarse;
-use tesdf_terminal::device::{self, Choice, Device};
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::progress::{interrupt_flag, watched};
-use tesdf_terminal::report::{self, Failure, Outcome};
-use tesdf_terminal::{parse, run_file};
+use crate::terminal::device::{self, Choice, Device};
+use crate::terminal::output::{self, Consent};
+use crate::terminal::progress::{interrupt_flag, watched};
+use crate::terminal::report::{self, Failure, Outcome};
+use crate::terminal::{parse, run_file};
 
 mod criteria;
 mod recorder;

@@ -5,8 +5,8 @@ use tesdf::collide::{Clearance, Motion, TimeOfImpact, TimeOfImpactOptions, time_
 
 use crate::clearance::rows as clearance_rows;
 use crate::collide::Bodies;
-use tesdf_terminal::parse;
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::parse;
+use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf toi`.
 #[derive(clap::Args, Debug)]

@@ -11,9 +11,9 @@ use tesdf::TeSdf;
 use tesdf::asset::AssetError;
 use tesdf::verify::{PrecisionReport, ProveReport, VerifyError, VerifyOptions, VerifyReport, Worst, verify};
 
-use tesdf_terminal::asset_file;
-use tesdf_terminal::progress::{Bar, interrupt_flag};
-use tesdf_terminal::report::{self, Failure, Outcome, count};
+use crate::terminal::asset_file;
+use crate::terminal::progress::{Bar, interrupt_flag};
+use crate::terminal::report::{self, Failure, Outcome, count};
 
 /// Arguments of `tesdf verify`.
 #[derive(clap::Args, Debug)]

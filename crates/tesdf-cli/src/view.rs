@@ -2,11 +2,11 @@
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
+use crate::terminal::output::{self, Consent};
+use crate::terminal::progress::{Bar, interrupt_flag};
+use crate::terminal::report::{self, Failure, Outcome};
 use tesdf::collide::CollideError;
 use tesdf_playback::{ContactOptions, FrameContacts, Playback, PlaybackError, page};
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::progress::{Bar, interrupt_flag};
-use tesdf_terminal::report::{self, Failure, Outcome};
 
 use crate::export::FrameArgs;
 use crate::open_run::{self, OpenRun};

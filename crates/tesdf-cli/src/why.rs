@@ -6,7 +6,7 @@ use tesdf::collide::{
     WhyReport, why,
 };
 
-use tesdf_terminal::report::{self, Failure, Outcome, count};
+use crate::terminal::report::{self, Failure, Outcome, count};
 
 /// Prints why contacts exist or not, for both ordered pairs of the bodies. For one `part`, an
 /// (instance, number) pair, it reports the ordered pair whose first body has this part.

@@ -62,7 +62,7 @@ pub enum Command {
 ///
 /// # Errors
 /// A file cannot be read, or its mesh cannot be encoded.
-pub fn run(command: &Command) -> Result<(), tesdf_terminal::report::Failure> {
+pub fn run(command: &Command) -> Result<(), tesdf_cli::terminal::report::Failure> {
     let result = match command {
         Command::Query(args) => query::run(args),
         Command::Batch(args) => batch::run(args),
@@ -77,5 +77,5 @@ pub fn run(command: &Command) -> Result<(), tesdf_terminal::report::Failure> {
         Command::FrankWolfe(args) => frank_wolfe::run(args),
         Command::Peers(args) => peers::run(args),
     };
-    result.map_err(tesdf_terminal::report::Failure::new)
+    result.map_err(tesdf_cli::terminal::report::Failure::new)
 }

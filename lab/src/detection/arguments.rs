@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use serde::Serialize;
 use tesdf::collide::{ContactsPer, Mode};
-use tesdf_terminal::device::{self, Choice};
-use tesdf_terminal::parse;
+use tesdf_cli::terminal::device::{self, Choice};
+use tesdf_cli::terminal::parse;
 
 use crate::preset::Preset;
 

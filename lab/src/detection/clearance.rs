@@ -8,8 +8,8 @@ use serde::Serialize;
 use tesdf::collide::{ClearanceOptions, CollideError, Instance, Pose, Scene, clearance};
 use tesdf::glam::DVec3;
 use tesdf::{EncodeOptions, TeSdf};
-use tesdf_terminal::progress::interrupt_flag;
-use tesdf_terminal::report::{self, Failure};
+use tesdf_cli::terminal::progress::interrupt_flag;
+use tesdf_cli::terminal::report::{self, Failure};
 
 use super::frames::geometry;
 use super::poses::{in_cube, rotation};

@@ -8,7 +8,7 @@ use super::arguments::Args;
 use super::frames::Frames;
 use super::hashes::Hashes;
 use super::report::{Counts, PHASES, Report, Spread, ms, text};
-use tesdf_terminal::report::{self as output, Failure};
+use tesdf_cli::terminal::report::{self as output, Failure};
 
 /// Measures a detection and prints the result.
 ///

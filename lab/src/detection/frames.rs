@@ -15,9 +15,9 @@ use tesdf::{Progress, TeSdf};
 use tesdf_sim::scene_file::{LoadedScene, MAX_BODIES};
 
 use super::poses::{PoseFile, VERSION};
-use tesdf_terminal::progress::{interrupt_flag, watched};
-use tesdf_terminal::report::Failure;
-use tesdf_terminal::{asset_file, mesh_file, run_file};
+use tesdf_cli::terminal::progress::{interrupt_flag, watched};
+use tesdf_cli::terminal::report::Failure;
+use tesdf_cli::terminal::{asset_file, mesh_file, run_file};
 
 /// Maximum number of instances in all worlds.
 const MAX_INSTANCES: usize = 1 << 20;

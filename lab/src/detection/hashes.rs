@@ -1,7 +1,7 @@
 //! Hashes of contacts: equal input must give equal bytes.
 use rayon::prelude::*;
 use tesdf::collide::Contact;
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::report::Failure;
 
 /// Number of contacts that a thread writes at a time: a million contacts take seconds.
 const TASK: usize = 4096;

@@ -7,7 +7,7 @@ use tesdf::collide::{
     detect_with, instance_pairs,
 };
 use tesdf::glam::DVec3;
-use tesdf_terminal::report::{self, Failure};
+use tesdf_cli::terminal::report::{self, Failure};
 
 use super::poses::{in_cube, rotation};
 use super::report::ms;

@@ -14,7 +14,7 @@ mod record;
 pub(crate) mod report;
 mod worlds;
 
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::report::Failure;
 
 /// Measurements of detection.
 #[derive(clap::Subcommand, Debug)]

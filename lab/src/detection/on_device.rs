@@ -3,7 +3,7 @@ use std::time::{Duration, Instant};
 
 use tesdf::collide::{CollideOptions, Reduction};
 use tesdf_gpu::{Counting, Detector, DetectorOptions, Device, Exchange, Lanes, Memory, Pruning};
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::report::Failure;
 
 use super::arguments::{Args, LanesName, ModeName};
 use super::frames::Frames;

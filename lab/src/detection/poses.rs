@@ -5,9 +5,9 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use tesdf::glam::{DQuat, DVec3};
 
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::parse;
-use tesdf_terminal::report::{self, Failure, count};
+use tesdf_cli::terminal::output::{self, Consent};
+use tesdf_cli::terminal::parse;
+use tesdf_cli::terminal::report::{self, Failure, count};
 
 /// The version that this build writes and reads.
 pub const VERSION: u32 = 1;

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use tesdf_sim::scene_file::LoadedScene;
 
 use super::poses::{PoseFile, VERSION, pose};
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::report::{self, Failure, count};
-use tesdf_terminal::run_file;
+use tesdf_cli::terminal::output::{self, Consent};
+use tesdf_cli::terminal::report::{self, Failure, count};
+use tesdf_cli::terminal::run_file;
 
 /// Arguments of `tesdf-lab record`.
 #[derive(clap::Args, Debug)]

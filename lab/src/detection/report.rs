@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use tesdf::collide::ContactsPer;
-use tesdf_terminal::report::size;
+use tesdf_cli::terminal::report::size;
 
 use super::arguments::{LanesName, ModeName};
 

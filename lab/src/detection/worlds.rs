@@ -7,8 +7,8 @@ use rayon::ThreadPoolBuilder;
 use serde_json::json;
 use tesdf::collide::{CollideError, CollideOptions, Instance, InstanceId, Pose, Scene, detect};
 use tesdf::glam::{DQuat, DVec3};
-use tesdf_terminal::report::{self, Failure};
-use tesdf_terminal::{asset_file, parse};
+use tesdf_cli::terminal::report::{self, Failure};
+use tesdf_cli::terminal::{asset_file, parse};
 
 use super::arguments::ModeName;
 

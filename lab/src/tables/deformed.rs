@@ -5,7 +5,7 @@ use tesdf::domain::ConformingMesh;
 use tesdf::geometry::{Aabb, orientation};
 use tesdf::glam::{DQuat, DVec3};
 
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::report::Failure;
 
 /// A bend of the far end relative to the near end, with a twist around the longest axis.
 #[derive(Clone, Copy, Debug, PartialEq)]

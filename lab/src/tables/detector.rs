@@ -4,8 +4,8 @@ use std::sync::Arc;
 use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene, detect};
 use tesdf_sim::newton::Detect;
 
-use tesdf_terminal::device::Choice;
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::device::Choice;
+use tesdf_cli::terminal::report::Failure;
 
 /// A detector that several engines use, one after the other.
 #[derive(Clone)]

@@ -10,8 +10,8 @@ use tesdf::mesh::SolidMesh;
 
 use super::DomainName;
 use super::meshes::Mesh;
-use tesdf_terminal::mesh_file;
-use tesdf_terminal::report::{Failure, note};
+use tesdf_cli::terminal::mesh_file;
+use tesdf_cli::terminal::report::{Failure, note};
 
 /// A solid in a domain.
 pub struct Subject {

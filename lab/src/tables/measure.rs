@@ -11,8 +11,8 @@ use super::domains::Subject;
 use super::output;
 use crate::on_grid::{self, BandReport};
 use crate::preset::Preset;
-use tesdf_terminal::progress::{Bar, watched};
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::progress::{Bar, watched};
+use tesdf_cli::terminal::report::Failure;
 
 /// The encoder, domain and options of a row.
 #[derive(Clone, Debug)]

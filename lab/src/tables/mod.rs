@@ -28,9 +28,9 @@ use meshes::{MESHES, Mesh};
 use output::Sink;
 use tesdf::domain::tetrahedra_files;
 
-use tesdf_terminal::device::{self, Choice};
-use tesdf_terminal::output::Consent;
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::device::{self, Choice};
+use tesdf_cli::terminal::output::Consent;
+use tesdf_cli::terminal::report::Failure;
 
 /// Tables and figures of the paper.
 #[derive(clap::Subcommand, Clone, Debug)]

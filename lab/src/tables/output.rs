@@ -6,8 +6,8 @@ use serde::Serialize;
 use tesdf::save::Destination;
 
 use super::{Format, OutputArgs};
-use tesdf_terminal::output;
-use tesdf_terminal::report::{self, Failure};
+use tesdf_cli::terminal::output;
+use tesdf_cli::terminal::report::{self, Failure};
 
 /// A table: the names of its columns, and its rows as text.
 pub struct Text {

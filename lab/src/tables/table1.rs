@@ -12,7 +12,7 @@ use super::measure::{Cells, Cost, Setup, compare};
 use super::meshes::{Deforms, MESHES, Mesh, Quick};
 use super::output::{Sink, Text, band, error, or_dash, short, threshold};
 use super::{TableArgs, paper};
-use tesdf_terminal::report::{Failure, note};
+use tesdf_cli::terminal::report::{Failure, note};
 
 /// E_max of the truncated lists.
 const MAX_ENTRIES: u32 = 32;

@@ -9,7 +9,7 @@ use super::measure::{Cells, Cost, Setup, compare};
 use super::meshes::{MESHES, SHAFT};
 use super::output::{Sink, Text, band, error, or_dash, short};
 use super::{TableArgs, paper};
-use tesdf_terminal::report::{Failure, note};
+use tesdf_cli::terminal::report::{Failure, note};
 
 /// The output of `--format json`.
 #[derive(Serialize)]

@@ -1,7 +1,7 @@
 //! The list of `tesdf devices`.
+use crate::terminal::report::{self, Failure, Outcome};
 use serde::Serialize;
 use tesdf_gpu::{DeviceInfo, GpuError, devices};
-use tesdf_terminal::report::{self, Failure, Outcome};
 
 use super::Args;
 

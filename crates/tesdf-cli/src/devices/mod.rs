@@ -1,5 +1,5 @@
 //! `tesdf devices`: lists the compute devices.
-use tesdf_terminal::report::{Failure, Outcome};
+use crate::terminal::report::{Failure, Outcome};
 
 #[cfg(feature = "gpu")]
 mod list;
@@ -27,5 +27,5 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 /// Always. The message says how to build the tool with the feature `gpu`.
 #[cfg(not(feature = "gpu"))]
 pub fn run(_: &Args) -> Result<Outcome, Failure> {
-    Err(tesdf_terminal::device::built_without(""))
+    Err(crate::terminal::device::built_without(""))
 }

@@ -2,6 +2,8 @@
 use std::num::NonZeroU32;
 use std::path::Path;
 
+use crate::terminal::parse;
+use crate::terminal::report::Failure;
 use clap::ValueEnum;
 use tesdf::base::{Inside, SurfaceFaces};
 use tesdf::encode::{
@@ -10,8 +12,6 @@ use tesdf::encode::{
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{AutoRepaired, NotSolid, SolidMesh, TriangleMesh};
 use tesdf::{Progress, TeSdf};
-use tesdf_terminal::parse;
-use tesdf_terminal::report::Failure;
 
 /// The options of the encoder.
 #[derive(clap::Args, Debug)]

@@ -13,9 +13,9 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::terminal::report::{Failure, Outcome};
 use tesdf::glam::{DAffine3, DVec3};
 use tesdf::mesh::MeshFormat;
-use tesdf_terminal::report::{Failure, Outcome};
 
 use super::Args;
 use crate::encode_all::file_names;

@@ -1,7 +1,7 @@
 //! `tesdf encode MESH --split -o FOLDER`: an asset for each object of a file.
+use crate::terminal::report::{self, Failure, Outcome};
 use tesdf::base::unit;
 use tesdf::mesh::{NamedMesh, split};
-use tesdf_terminal::report::{self, Failure, Outcome};
 
 use super::Args;
 use crate::encode_all::file_names;

@@ -15,9 +15,9 @@ use tesdf::{Certificate, Progress, TeSdf};
 
 use super::meshes::{Content, Mesh, Placed};
 use crate::encode::choices::{ChoiceArgs, RepairChoice, encode, solid};
-use tesdf_terminal::asset_file;
-use tesdf_terminal::mesh_file::{self, CadArgs};
-use tesdf_terminal::report::Failure;
+use crate::terminal::asset_file;
+use crate::terminal::mesh_file::{self, CadArgs};
+use crate::terminal::report::Failure;
 
 /// The work on each mesh.
 #[derive(Debug)]

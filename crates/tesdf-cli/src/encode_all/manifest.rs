@@ -6,7 +6,7 @@ use tesdf::encode::EncodeOptions;
 use super::Shard;
 use super::job::{Asset, Done, Job, State};
 use super::meshes::{Details, Mesh};
-use tesdf_terminal::report::Failure;
+use crate::terminal::report::Failure;
 
 /// `manifest.json`: all that does not change from run to run.
 #[derive(Serialize)]

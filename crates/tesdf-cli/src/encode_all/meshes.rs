@@ -3,12 +3,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::terminal::mesh_file::CadArgs;
+use crate::terminal::report::Failure;
 use serde::Serialize;
 use tesdf::glam::DAffine3;
 use tesdf::input;
 use tesdf::mesh::{LoadReport, MeshFormat, TriangleMesh};
-use tesdf_terminal::mesh_file::CadArgs;
-use tesdf_terminal::report::Failure;
 use walkdir::WalkDir;
 
 use super::Shard;

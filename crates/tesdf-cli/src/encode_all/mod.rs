@@ -23,14 +23,14 @@ use tesdf::Progress;
 use tesdf::encode::DomainChoice;
 
 use crate::encode::choices::ChoiceArgs;
+use crate::terminal::mesh_file::CadArgs;
+use crate::terminal::output::{self, Consent};
+use crate::terminal::progress::{Bar, interrupt_flag};
+use crate::terminal::report::{self, Failure, Outcome};
 use job::{Done, Job, State};
 use manifest::{Manifest, Times};
 use meshes::Mesh;
 pub use shard::Shard;
-use tesdf_terminal::mesh_file::CadArgs;
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::progress::{Bar, interrupt_flag};
-use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf encode-all`.
 #[derive(clap::Args, Debug)]

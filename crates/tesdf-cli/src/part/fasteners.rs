@@ -2,7 +2,7 @@
 use tesdf_parts::{PartError, Resolution, Size, Thread};
 
 use super::{Common, Made, Make, mm};
-use tesdf_terminal::parse;
+use crate::terminal::parse;
 
 /// Arguments of `tesdf part bolt`.
 #[derive(clap::Args, Debug)]

@@ -2,7 +2,7 @@
 use tesdf_parts::{ChainLink, Groove, LobedHole, LobedPeg, Lobes, PartError, Resolution};
 
 use super::{Common, Made, Make, mm};
-use tesdf_terminal::parse;
+use crate::terminal::parse;
 
 /// The cross-section of peg and hole.
 #[derive(clap::Args, Debug)]

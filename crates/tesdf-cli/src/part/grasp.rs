@@ -2,7 +2,7 @@
 use tesdf_parts::{PartError, Resolution};
 
 use super::{Common, Made, Make};
-use tesdf_terminal::parse;
+use crate::terminal::parse;
 
 /// Arguments of `tesdf part finger`.
 #[derive(clap::Args, Debug)]

@@ -9,9 +9,9 @@ use tesdf::{SolidMesh, TriangleMesh};
 use tesdf_parts::{PartError, Resolution};
 use tesdf_sim::MassProperties;
 
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::parse;
-use tesdf_terminal::report::{self, Failure, Outcome, count};
+use crate::terminal::output::{self, Consent};
+use crate::terminal::parse;
+use crate::terminal::report::{self, Failure, Outcome, count};
 
 mod fasteners;
 mod fits;

@@ -2,7 +2,7 @@
 use tesdf_parts::{Bore, Hub, Keyway, PartError, Profile, Resolution, Section, Spline, Teeth};
 
 use super::{Common, Made, Make, mm};
-use tesdf_terminal::parse;
+use crate::terminal::parse;
 
 /// The dog teeth of gears and sleeves.
 #[derive(clap::Args, Debug)]

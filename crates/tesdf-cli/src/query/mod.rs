@@ -8,9 +8,9 @@ use tesdf::input;
 
 pub use points::{HEADER, PointsError, read, write};
 
-use tesdf_terminal::asset_file;
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::{self, Failure, Outcome};
+use crate::terminal::asset_file;
+use crate::terminal::progress::Bar;
+use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf query`.
 #[derive(clap::Args, Debug)]

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use tesdf::collide::Shape;
 use tesdf::glam::DVec3;
 
-use tesdf_terminal::asset_file::{Assets, check_units};
-use tesdf_terminal::parse;
-use tesdf_terminal::report::Failure;
+use crate::terminal::asset_file::{Assets, check_units};
+use crate::terminal::parse;
+use crate::terminal::report::Failure;
 
 /// Geometry of a body: a file or a simple shape.
 #[derive(Clone, Debug)]

@@ -27,9 +27,9 @@ pub use picture::{Scenery, render};
 pub use stage::{Drawn, Exposure};
 pub use tesdf_playback::{Linear, linear, of_body};
 
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::parse;
-use tesdf_terminal::report::{Failure, Outcome};
+use crate::terminal::output::{self, Consent};
+use crate::terminal::parse;
+use crate::terminal::report::{Failure, Outcome};
 
 /// Why a picture cannot be drawn.
 #[derive(Debug, thiserror::Error)]

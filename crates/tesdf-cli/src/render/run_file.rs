@@ -1,12 +1,12 @@
 //! The bodies of a recorded run at one of its steps.
 use std::path::Path;
 
+use crate::terminal::progress::interrupt_flag;
+use crate::terminal::report::Failure;
 use tesdf::collide::Placement;
 use tesdf::glam::Vec3;
 use tesdf::save::Destination;
 use tesdf_sim::record::RecordedContact;
-use tesdf_terminal::progress::interrupt_flag;
-use tesdf_terminal::report::Failure;
 
 use super::{Args, ContactMark, Posed};
 use crate::open_run::{self, OpenRun};

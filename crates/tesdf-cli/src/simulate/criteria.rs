@@ -1,10 +1,10 @@
 //! What the summary of a run says of the scene's criteria.
+use crate::terminal::report;
 use tesdf_sim::Summary;
 use tesdf_sim::criterion::{
     AssemblyReport, EngagedReport, GearRatioReport, HoistReport, InsertionReport, LiftReport, RestReport,
     ScrewReport, SeparationReport, TransmissionReport,
 };
-use tesdf_terminal::report;
 
 type Rows = Vec<(&'static str, String)>;
 

@@ -6,8 +6,8 @@ use tesdf::save::Destination;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::{InterruptedRun, Moment, RunJournal, RunOrigin, RunRecord, SimulateError};
 
-use tesdf_terminal::output;
-use tesdf_terminal::report::Failure;
+use crate::terminal::output;
+use crate::terminal::report::Failure;
 
 /// Records each step of a run at its destination. The first step replaces the existing file.
 pub struct Recorder<'a> {

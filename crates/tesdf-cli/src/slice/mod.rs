@@ -22,9 +22,9 @@ pub use cut::{Axis, View, cut_tetrahedron, cut_triangle};
 pub use error::{Deviation, draw_error};
 pub use picture::{PictureError, draw};
 
-use tesdf_terminal::output::{self, Consent};
-use tesdf_terminal::report::{Failure, Outcome};
-use tesdf_terminal::{asset_file, parse};
+use crate::terminal::output::{self, Consent};
+use crate::terminal::report::{Failure, Outcome};
+use crate::terminal::{asset_file, parse};
 
 /// Arguments of `tesdf slice`.
 #[derive(clap::Args, Debug)]

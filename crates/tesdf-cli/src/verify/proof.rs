@@ -5,8 +5,8 @@ use tesdf::TeSdf;
 use tesdf::verify::{Fault, ProveError, ProveOptions, ProveReport, Tally, Verdict, prove};
 
 use super::{Args, show_progress, uninterrupted};
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::{Failure, count};
+use crate::terminal::progress::Bar;
+use crate::terminal::report::{Failure, count};
 
 /// Proves the claims of the file's certificate.
 ///

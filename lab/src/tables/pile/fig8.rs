@@ -12,9 +12,9 @@ use super::{PileArgs, Shaft, e_max};
 use crate::tables::detector::Shared;
 use crate::tables::output::{Sink, Text, open_in_folder, short};
 use crate::tables::paper;
-use tesdf_terminal::output;
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::{Failure, note};
+use tesdf_cli::terminal::output;
+use tesdf_cli::terminal::progress::Bar;
+use tesdf_cli::terminal::report::{Failure, note};
 
 /// Arguments of Figure 8.
 #[derive(clap::Args, Clone, Debug)]

@@ -14,10 +14,10 @@ use crate::detection::report::{Spread, ms};
 use crate::tables::detector::Shared;
 use crate::tables::output::{Sink, Text, open_in_folder, or_dash, short};
 use crate::tables::paper;
-use tesdf_terminal::device::Device;
-use tesdf_terminal::output;
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::{Failure, note};
+use tesdf_cli::terminal::device::Device;
+use tesdf_cli::terminal::output;
+use tesdf_cli::terminal::progress::Bar;
+use tesdf_cli::terminal::report::{Failure, note};
 
 /// Arguments of Figure 9.
 #[derive(clap::Args, Clone, Debug)]

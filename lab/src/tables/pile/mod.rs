@@ -17,8 +17,8 @@ use super::domains::{Subject, open};
 use super::measure::{Cells, Setup};
 use super::meshes::{MESHES, SHAFT};
 use super::{DomainName, OutputArgs};
-use tesdf_terminal::device::{self, Choice};
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::device::{self, Choice};
+use tesdf_cli::terminal::report::Failure;
 
 /// What both figures need.
 #[derive(clap::Args, Clone, Debug)]

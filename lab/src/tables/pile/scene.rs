@@ -8,8 +8,8 @@ use tesdf_sim::{PartialRun, RunRecord, Summary, System, simulate_from};
 
 use super::PileArgs;
 use crate::tables::detector::Shared;
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::progress::Bar;
+use tesdf_cli::terminal::report::Failure;
 
 /// Name of the scene's file, without its extension.
 const NAME: &str = "pile-of-shafts";

@@ -14,9 +14,9 @@ use tesdf::inspect::{InspectOptions, inspect};
 use super::{Args, Scenario};
 use crate::detection::frames::Frames;
 use crate::detection::report::{Spread, ms};
-use tesdf_terminal::device::Device;
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::device::Device;
+use tesdf_cli::terminal::progress::Bar;
+use tesdf_cli::terminal::report::Failure;
 
 /// Contacts that a reduction keeps of a pair of bodies.
 pub const KEPT: u32 = 64;

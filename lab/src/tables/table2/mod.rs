@@ -12,9 +12,9 @@ use super::output::Sink;
 use super::paper::{TABLE_2, Table2};
 use crate::preset::Preset;
 use measure::Row;
-use tesdf_terminal::device::{self, Choice};
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::{Failure, note};
+use tesdf_cli::terminal::device::{self, Choice};
+use tesdf_cli::terminal::progress::Bar;
+use tesdf_cli::terminal::report::{Failure, note};
 
 /// Arguments of Table II.
 #[derive(clap::Args, Clone, Debug)]

@@ -5,8 +5,8 @@ use tempfile::TempDir;
 use tesdf::encode::Encoder;
 use tesdf::mesh::SolidMesh;
 use tesdf_parts::{LobedHole, Nut, Resolution, Size};
-use tesdf_terminal::mesh_file;
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::mesh_file;
+use tesdf_cli::terminal::report::Failure;
 
 use super::Scenario;
 use crate::preset::Preset;

@@ -11,7 +11,7 @@ use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{Moment, Summary, System, simulate};
 
 use super::{Features, Scenario};
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::report::Failure;
 
 /// Measurements of the exact clearance in a run.
 const MEASUREMENTS: u64 = 8;

@@ -11,8 +11,8 @@ use tesdf_sim::System;
 
 use super::Scenario;
 use crate::voxel::{VoxelAccuracy, VoxelGrid, VoxelOptions, accuracy};
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::progress::Bar;
+use tesdf_cli::terminal::report::Failure;
 
 /// Memory of the two meshes of a scene, encoded.
 #[derive(Clone, Debug, Serialize)]

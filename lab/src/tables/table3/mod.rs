@@ -21,9 +21,9 @@ use assets::Assets;
 use cell::{Cell, Setup};
 use memory::{Encoded, Grids, Voxels, geometries};
 pub use scenario::Scenario;
-use tesdf_terminal::device::{self, Choice};
-use tesdf_terminal::progress::Bar;
-use tesdf_terminal::report::{Failure, note};
+use tesdf_cli::terminal::device::{self, Choice};
+use tesdf_cli::terminal::progress::Bar;
+use tesdf_cli::terminal::report::{Failure, note};
 
 /// Arguments of Table III.
 #[derive(clap::Args, Clone, Debug)]

@@ -4,7 +4,7 @@ use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use super::assets::Assets;
 use super::{Args, Features};
 use crate::tables::paper::{self, Table3};
-use tesdf_terminal::report::Failure;
+use tesdf_cli::terminal::report::Failure;
 
 /// A scene of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, clap::ValueEnum)]

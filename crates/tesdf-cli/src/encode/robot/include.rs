@@ -4,7 +4,7 @@
 //! which MuJoCo takes as well.
 use std::path::{Path, PathBuf};
 
-use tesdf_terminal::report::Failure;
+use crate::terminal::report::Failure;
 
 use super::{parse, read};
 

@@ -1,10 +1,10 @@
 //! The collision meshes of an MJCF file.
 use std::path::Path;
 
+use crate::terminal::report::Failure;
 use mjcf_rs::Model;
 use mjcf_rs::body::{Geom, GeomType};
 use tesdf::glam::{DAffine3, DQuat, DVec3};
-use tesdf_terminal::report::Failure;
 
 use super::{MeshUse, include};
 use crate::encode_all::meshes::Use;

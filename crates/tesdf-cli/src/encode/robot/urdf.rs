@@ -1,8 +1,8 @@
 //! The collision meshes of a URDF file.
 use std::path::{Path, PathBuf};
 
+use crate::terminal::report::Failure;
 use tesdf::glam::{DAffine3, DVec3};
-use tesdf_terminal::report::Failure;
 
 use super::packages::Packages;
 use super::{MeshUse, parse, read};

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use tesdf::save::{Destination, ReadOnly, SaveError, SaveOptions};
 
-use crate::report::{self, Failure};
+use crate::terminal::report::{self, Failure};
 
 /// The option of every command that writes a file.
 #[derive(clap::Args, Clone, Copy, Debug)]

@@ -8,7 +8,7 @@ use tesdf::asset::{AssetError, Container, layout};
 use tesdf::base::unit::is_same_unit;
 use tesdf::geometry::Aabb;
 
-use crate::report::{self, Failure};
+use crate::terminal::report::{self, Failure};
 
 /// Opens an asset. The error message names the file.
 ///

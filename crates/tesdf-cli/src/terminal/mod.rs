@@ -2,8 +2,6 @@
 //! and devices.
 //!
 //! Stdout carries only a command's result; notes, warnings, errors and progress go to stderr.
-#![warn(missing_docs)]
-
 pub mod asset_file;
 pub mod device;
 pub mod mesh_file;

@@ -4,7 +4,7 @@ use tesdf::encode::Sampler;
 use tesdf_gpu::{DeviceSampler, SharedDetector};
 use tesdf_sim::newton::Detect;
 
-use crate::report::Failure;
+use crate::terminal::report::Failure;
 
 /// An open device.
 pub struct Device(pub tesdf_gpu::Device);

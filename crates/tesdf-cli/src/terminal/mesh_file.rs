@@ -4,8 +4,8 @@ use std::path::Path;
 use tesdf::Length;
 use tesdf::mesh::{CadOptions, LoadReport, LoadedMesh, MeshFormat};
 
-use crate::parse;
-use crate::report::{Failure, count};
+use crate::terminal::parse;
+use crate::terminal::report::{Failure, count};
 
 /// The formats of mesh files, for the help of arguments.
 pub const MESH_HELP: &str =

@@ -5,7 +5,7 @@
 use tesdf::encode::Processor;
 use tesdf::encode::Sampler;
 
-use crate::report::Failure;
+use crate::terminal::report::Failure;
 
 #[cfg(feature = "gpu")]
 mod gpu;

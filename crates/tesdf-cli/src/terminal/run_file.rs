@@ -4,7 +4,7 @@ use std::path::Path;
 use tesdf_sim::RunRecord;
 use tesdf_sim::record::RecordError;
 
-use crate::report::{self, Failure};
+use crate::terminal::report::{self, Failure};
 
 /// Most warnings of a run that are printed when it is opened.
 const MOST: usize = 8;

@@ -3,7 +3,7 @@ use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene};
 use tesdf::encode::Sampler;
 use tesdf_sim::newton::Detect;
 
-use crate::report::Failure;
+use crate::terminal::report::Failure;
 
 /// A device. No value of this type exists.
 pub enum Device {}

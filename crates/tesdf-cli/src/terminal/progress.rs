@@ -7,7 +7,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use tesdf::{Progress, Stage};
 
-use crate::report::Failure;
+use crate::terminal::report::Failure;
 
 /// A progress bar on stderr with the estimated remaining time. Nothing is drawn unless stderr is a
 /// terminal.
