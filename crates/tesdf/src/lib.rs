@@ -1,4 +1,4 @@
-//! Exact, memory-lean signed distances to closed triangle meshes, and the contacts between them.
+//! Exact, memory-lean signed distances to triangle meshes, and the contacts between them.
 //!
 //! ```text
 //! mesh file ──mesh──▶ SolidMesh ──domain, encode──▶ TeSdf ──asset──▶ model.tesdf
@@ -6,15 +6,15 @@
 //!                                                                 closest point, face
 //! ```
 //!
-//! A [`SolidMesh`] is a triangle mesh without gaps; its triangles are called *faces*. The *domain*
-//! is a set of tetrahedra, the *cells*, in and around the solid. A [`TeSdf`], the *asset*, holds a
-//! *list* for each cell: the faces that can be nearest to a point of the cell. The distance at a
-//! point is the least distance to the faces on its cell's list. The [`Certificate`] says what the
-//! encoder has proved about the lists.
+//! A [`SolidMesh`] is a triangle mesh that has an inside: one without gaps, unless a rule takes
+//! others. Its triangles are called *faces*. The *domain* is a set of tetrahedra, the *cells*, in
+//! and around the solid. A [`TeSdf`], the *asset*, holds a *list* for each cell: the faces that can
+//! be nearest to a point of the cell. The distance at a point is the least distance to the faces on
+//! its cell's list. The [`Certificate`] says what the encoder has proved about the lists.
 //!
 //! Each module uses only modules to its left: `base`, `input`, `save` ← `geometry` ← `mesh` ←
 //! `domain` ← `asset` ← `query` ← `verify` ← `encode` ← `deform`. Besides, `collide` comes after
-//! `query`, and `inspect` after `asset`.
+//! `query`, `evaluate` after `verify`, and `inspect` after `asset`.
 //!
 //! # Signed distances
 //!
@@ -86,6 +86,8 @@ pub mod deform;
 pub mod domain;
 #[cfg(feature = "encode")]
 pub mod encode;
+#[cfg(feature = "encode")]
+pub mod evaluate;
 pub mod geometry;
 pub mod input;
 #[cfg(feature = "encode")]

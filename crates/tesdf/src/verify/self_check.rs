@@ -12,8 +12,7 @@ use crate::mesh::{MeshError, SolidMesh};
 use crate::query::Precision;
 use crate::sampling::Random;
 
-/// Number of points in cells of one kind. The whole check takes 2 % of the encoding time
-/// (docs/benchmarks.md).
+/// Number of points in cells of one kind. The whole check takes 2 % of the encoding time.
 const POINTS: usize = 128;
 const SEED: u64 = 0x7e5d;
 const KINDS: [CellKind; 6] = [
