@@ -14,7 +14,7 @@
 //!
 //! Each module uses only modules to its left: `base`, `input`, `save` ← `geometry` ← `mesh` ←
 //! `domain` ← `asset` ← `query` ← `verify` ← `encode` ← `deform`. Besides, `collide` comes after
-//! `query`, `evaluate` after `verify`, and `inspect` after `asset`.
+//! `query`, and `inspect` after `asset`.
 //!
 //! # Signed distances
 //!
@@ -86,8 +86,6 @@ pub mod deform;
 pub mod domain;
 #[cfg(feature = "encode")]
 pub mod encode;
-#[cfg(feature = "encode")]
-pub mod evaluate;
 pub mod geometry;
 pub mod input;
 #[cfg(feature = "encode")]
