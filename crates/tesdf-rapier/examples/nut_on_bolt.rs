@@ -11,7 +11,7 @@ use std::sync::Arc;
 use tesdf::glam::DVec3;
 use tesdf::{CollideOptions, Encoder, Instance, Mode, Pose, Preset, Reduction, Shape, TeSdf};
 use tesdf_rapier::{RapierEngine, RapierOptions};
-use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker};
+use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker, Tracker};
 use tesdf_sim::{Dynamics, Mass, MassProperties, System};
 
 /// Density of steel, kg/m³.

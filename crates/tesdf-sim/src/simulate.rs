@@ -5,10 +5,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::criterion::{
-    AssemblyReport, GearRatioReport, HoistReport, InsertionReport, JointDrift, LiftReport, Reports,
-    RestReport, ScrewReport, SeparationReport, Trackers, TransmissionReport,
-};
+use crate::criterion::{CriterionReport, JointDrift, Report, Trackers, by_name};
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
 use crate::totals::Totals;
@@ -54,26 +51,20 @@ pub struct Summary {
     pub hidden: Vec<HiddenPair>,
     /// What the run did not do as the scene asks.
     pub warnings: Vec<Warning>,
-    /// Result of the screw criterion, if the scene has one.
-    pub screw: Option<ScrewReport>,
-    /// Result of the rest criterion, if the scene has one.
-    pub rest: Option<RestReport>,
-    /// Result of the insertion criterion, if the scene has one.
-    pub insertion: Option<InsertionReport>,
-    /// Result of the lift criterion, if the scene has one.
-    pub lift: Option<LiftReport>,
-    /// Result of the gear ratio criterion, if the scene has one.
-    pub gear_ratio: Option<GearRatioReport>,
-    /// Result of the separation criterion, if the scene has one.
-    pub separation: Option<SeparationReport>,
-    /// Result of the hoist criterion, if the scene has one.
-    pub hoist: Option<HoistReport>,
-    /// Result of the transmission criterion, if the scene has one.
-    pub transmission: Option<TransmissionReport>,
-    /// Result of the assembly criterion, if the scene has one.
-    pub assembly: Option<AssemblyReport>,
+    /// Results of the scene's criteria. As JSON each is a field of the summary, with the name of the
+    /// criterion.
+    #[serde(flatten, serialize_with = "by_name")]
+    pub criteria: Vec<CriterionReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
+}
+
+impl Summary {
+    /// The result of a criterion, such as [`RestReport`](crate::criterion::RestReport); `None` when the
+    /// scene does not have this criterion.
+    pub fn report<R: Report>(&self) -> Option<&R> {
+        self.criteria.iter().find_map(CriterionReport::report)
+    }
 }
 
 /// The state of a run after a step.
@@ -354,10 +345,8 @@ impl Run {
     pub fn summary(&self, system: &System) -> Summary {
         let hidden = self.record.hidden_pairs();
         let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
-        let mut reports = self.trackers.report(system, &messages);
-        let passed = reports.passed();
-        let Reports { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly } =
-            reports;
+        let criteria = self.trackers.report(system, &messages);
+        let passed = (!criteria.is_empty()).then(|| criteria.iter().all(|report| report.failures.is_empty()));
         let sums = sums(&self.totals);
         let depths = hidden.iter().map(|pair| pair.depth);
         let (momentum, angular_momentum) = system.momentum();
@@ -371,15 +360,7 @@ impl Run {
             kinetic_energy: system.kinetic_energy(),
             released_energy: self.energy - system.potential_energy(),
             passed,
-            screw,
-            rest,
-            insertion,
-            lift,
-            gear_ratio,
-            separation,
-            hoist,
-            transmission,
-            assembly,
+            criteria,
             warnings,
             deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
             hidden,

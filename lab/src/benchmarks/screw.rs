@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, CollideError, clearance};
+use tesdf_sim::criterion::{ScrewCriterion, ScrewReport};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Moment, Summary, System, simulate};
 
@@ -79,7 +80,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut loaded = LoadedScene::read(&args.scene)?;
     loaded.scene.duration = args.duration.unwrap_or(loaded.scene.duration);
     loaded.scene.record.contacts_every = 0;
-    let screw = loaded.scene.criterion.screw.clone();
+    let screw = loaded.scene.criterion.get::<ScrewCriterion>();
     let screw = screw.ok_or_else(|| format!("{}: it has no criterion.screw", args.scene.display()))?;
     let scenes = match args.geometries.is_empty() {
         true => vec![(screw.body.clone(), loaded.clone())],
@@ -93,8 +94,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(format!("{} backlashes for {} geometries", args.backlash.len(), scenes.len()).into());
     }
     for (k, (name, mut loaded)) in scenes.into_iter().enumerate() {
-        if let (Some(screw), Some(play)) = (&mut loaded.scene.criterion.screw, args.backlash.get(k)) {
-            screw.backlash = play * 1e-6;
+        if let Some(play) = args.backlash.get(k) {
+            loaded.scene.criterion.set(&ScrewCriterion { backlash: play * 1e-6, ..screw.clone() });
         }
         let system = loaded.system()?;
         for &mode in &args.modes {
@@ -150,7 +151,7 @@ fn one(loaded: &LoadedScene, system: System, measurements: u64) -> Result<(Summa
 }
 
 fn print(start: impl Iterator<Item = String>, summary: &Summary, depth: f64) -> Result<(), Failure> {
-    let Some(screw) = &summary.screw else { return Err("the run has no screw".into()) };
+    let Some(screw) = summary.report::<ScrewReport>() else { return Err("the run has no screw".into()) };
     let rest = [
         format!("{:.0}", summary.mean_contacts),
         format!("{:.2}", depth * 1e6),

@@ -6,7 +6,7 @@ use crate::support::{cube, data, steel};
 use tesdf::collide::{CollideOptions, Groups, Instance, Mode, Pose, Reduction, Shape};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_rapier::{RapierEngine, RapierOptions};
-use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker};
+use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker, Tracker};
 use tesdf_sim::{Dynamics, DynamicsError, Joint, JointKind, Mass, State, System, Wrench};
 
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, body, free_body, least_distance, near, positive};
+use super::shared::{Checks, Penetration, body, clearance_row, free_body, least_distance, near, positive};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::joint::{relative, wrapped};
 use crate::{Joint, Mass, System};
 
@@ -124,13 +125,13 @@ pub struct PartReport {
     pub pitch_error: Option<f64>,
 }
 
-impl AssemblyCriterion {
+impl Criterion for AssemblyCriterion {
+    const NAME: &str = "assembly";
+    type Tracker = AssemblyTracker;
+
     /// Checks the values, that the bodies exist, that no joint holds a part, and that no part
     /// starts in its place. Returns the names of the parts.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate(&self, system: &System) -> Result<Vec<String>, String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         positive([
             ("max_penetration", self.max_penetration),
             ("max_speed", self.max_speed),
@@ -153,6 +154,12 @@ impl AssemblyCriterion {
         Ok(parts.into_iter().map(|part| part.name).collect())
     }
 
+    fn track(&self, system: &System) -> Result<AssemblyTracker, String> {
+        AssemblyTracker::new(self, system)
+    }
+}
+
+impl AssemblyCriterion {
     fn find(&self, system: &System) -> Result<Vec<Part>, String> {
         let pegs = self.pegs.iter().map(|group| {
             let seat = DVec3::from_array(group.seat);
@@ -379,15 +386,48 @@ impl AssemblyTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`AssemblyCriterion::validate`].
+    /// The same errors as [`AssemblyCriterion::check`].
     pub fn new(criterion: &AssemblyCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         let (parts, checks) = (criterion.find(system)?, Checks::new(criterion.check_every));
         Ok(Self { criterion: criterion.clone(), parts, checks })
     }
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+    /// The parts that are too near to a moving body that is no part.
+    fn still_held(&self, system: &System) -> Vec<String> {
+        let least = self.criterion.min_release;
+        let pairs = match near(system, least) {
+            Ok(pairs) => pairs,
+            Err(reason) => return vec![format!("release: not measured: {reason}")],
+        };
+        let is_part = |instance: InstanceId| self.parts.iter().any(|part| part.instance == instance);
+        let bodies = system.bodies();
+        let moving =
+            bodies.iter().filter(|body| !matches!(body.mass, Mass::Fixed) && !is_part(body.instance));
+        let mut failures = Vec::new();
+        for holder in moving {
+            for part in &self.parts {
+                let both = [part.instance, holder.instance];
+                let pair = pairs.iter().find(|pair| both.iter().all(|instance| pair.contains(instance)));
+                let Some(&pair) = pair else { continue };
+                let (name, holder) = (&part.name, &holder.name);
+                match least_distance(system, &[pair], 1e-2 * least) {
+                    Ok(distance) if distance >= least => {}
+                    Ok(distance) => failures.push(format!(
+                        "release: {holder} is {distance:.3e} m from {name} at the end; expected at least {least:.3e} m"
+                    )),
+                    Err(reason) => failures.push(format!("release: {holder} and {name}: not measured: {reason}")),
+                }
+            }
+        }
+        failures
+    }
+}
+
+impl Tracker for AssemblyTracker {
+    type Report = AssemblyReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         let is_due = self.checks.due(time_step);
         let near = is_due.then(|| near(system, 0.0));
         for part in &mut self.parts {
@@ -405,8 +445,7 @@ impl AssemblyTracker {
         }
     }
 
-    /// Compares the run so far with the criterion.
-    pub fn report(&self, system: &System) -> AssemblyReport {
+    fn report(&self, system: &System) -> AssemblyReport {
         let mut failures = Vec::new();
         let mut assembled = 0;
         for part in &self.parts {
@@ -440,34 +479,32 @@ impl AssemblyTracker {
             failures,
         }
     }
+}
 
-    /// The parts that are too near to a moving body that is no part.
-    fn still_held(&self, system: &System) -> Vec<String> {
-        let least = self.criterion.min_release;
-        let pairs = match near(system, least) {
-            Ok(pairs) => pairs,
-            Err(reason) => return vec![format!("release: not measured: {reason}")],
-        };
-        let is_part = |instance: InstanceId| self.parts.iter().any(|part| part.instance == instance);
-        let bodies = system.bodies();
-        let moving =
-            bodies.iter().filter(|body| !matches!(body.mass, Mass::Fixed) && !is_part(body.instance));
-        let mut failures = Vec::new();
-        for holder in moving {
-            for part in &self.parts {
-                let both = [part.instance, holder.instance];
-                let pair = pairs.iter().find(|pair| both.iter().all(|instance| pair.contains(instance)));
-                let Some(&pair) = pair else { continue };
-                let (name, holder) = (&part.name, &holder.name);
-                match least_distance(system, &[pair], 1e-2 * least) {
-                    Ok(distance) if distance >= least => {}
-                    Ok(distance) => failures.push(format!(
-                        "release: {holder} is {distance:.3e} m from {name} at the end; expected at least {least:.3e} m"
-                    )),
-                    Err(reason) => failures.push(format!("release: {holder} and {name}: not measured: {reason}")),
+impl Report for AssemblyReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        let AssemblyReport { assembled, parts, penetration, measurements, .. } = self;
+        let mut rows = vec![("assembled", format!("{assembled} of {} parts", parts.len()))];
+        rows.extend(parts.iter().map(|part| {
+            let place = format!(
+                "{}: {:.1} µm off the axis, {:.2} mrad of tilt",
+                part.name,
+                1e6 * part.offset,
+                1e3 * part.tilt
+            );
+            let more = match (part.turns, part.pitch_error) {
+                (Some(turns), Some(error)) => {
+                    format!("{turns:.3} turns, {:.1} µm between travel and turns × pitch", 1e6 * error)
                 }
-            }
-        }
-        failures
+                _ => format!("{:.1} µm above its place", 1e6 * part.depth),
+            };
+            ("part", format!("{place}, {more}"))
+        }));
+        rows.push(clearance_row(*penetration, *measurements));
+        rows
     }
 }

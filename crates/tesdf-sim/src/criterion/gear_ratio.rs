@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 use tesdf::collide::InstanceId;
 
-use super::shared::{Checks, Hinge, Penetration, positive};
+use super::shared::{Checks, Hinge, Penetration, clearance_row, positive};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::{Drive, Mass, Motor, System};
 
 /// A gear on a hinge turns a gear on another hinge at the ratio of their teeth, by contact alone.
@@ -73,13 +74,13 @@ pub struct GearRatioReport {
     pub failures: Vec<String>,
 }
 
-impl GearRatioCriterion {
+impl Criterion for GearRatioCriterion {
+    const NAME: &str = "gear_ratio";
+    type Tracker = GearRatioTracker;
+
     /// Checks the values, that the joints are hinges, and that nothing but a load acts on the
     /// driven one. Returns the name of the body of the driven gear.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate<'a>(&self, system: &'a System) -> Result<&'a str, String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         if !(self.ratio != 0.0 && self.ratio.is_finite()) {
             return Err(format!("ratio is {}; expected a finite number other than 0", self.ratio));
         }
@@ -94,9 +95,15 @@ impl GearRatioCriterion {
             ("check_every", self.check_every),
         ])?;
         let [_, driven] = self.find(system)?;
-        Ok(&system.bodies()[driven.child(system)].name)
+        Ok(vec![system.bodies()[driven.child(system)].name.clone()])
     }
 
+    fn track(&self, system: &System) -> Result<GearRatioTracker, String> {
+        GearRatioTracker::new(self, system)
+    }
+}
+
+impl GearRatioCriterion {
     /// The two hinges.
     fn find(&self, system: &System) -> Result<[Hinge; 2], String> {
         let hinges @ [driver, driven] =
@@ -148,9 +155,9 @@ impl GearRatioTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`GearRatioCriterion::validate`].
+    /// The same errors as [`GearRatioCriterion::check`].
     pub fn new(criterion: &GearRatioCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         let hinges = criterion.find(system)?;
         let load = match hinges[1].motor(system) {
             Some(Motor { drive: Drive::Force(torque), .. }) => torque,
@@ -169,9 +176,12 @@ impl GearRatioTracker {
             criterion: criterion.clone(),
         })
     }
+}
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+impl Tracker for GearRatioTracker {
+    type Report = GearRatioReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         self.time += time_step;
         let [driver, driven] = self.hinges.each_ref().map(|hinge| hinge.speed(system));
         let turned = self.hinges.each_mut().map(|hinge| hinge.turned(system, time_step));
@@ -190,8 +200,7 @@ impl GearRatioTracker {
         self.speeds = [self.speeds[0].max((driven - expected).abs()), self.speeds[1].max(expected.abs())];
     }
 
-    /// Compares the run so far with the criterion.
-    pub fn report(&self) -> GearRatioReport {
+    fn report(&self, _: &System) -> GearRatioReport {
         let GearRatioCriterion { ratio, min_turns, settled, pitch_radius, .. } = self.criterion;
         let [driver_turns, driven_turns] = self.angles.unwrap_or_default().map(|angle| angle / TAU);
         let transmission_error = pitch_radius * (self.error[1] - self.error[0]);
@@ -248,5 +257,30 @@ impl GearRatioTracker {
             measurements: self.penetration.measurements,
             failures,
         }
+    }
+}
+
+impl Report for GearRatioReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        let ratio = self.ratio.map_or("none".into(), |ratio| format!("{ratio:.6}"));
+        vec![
+            (
+                "gear ratio",
+                format!("{ratio}, {:.4} turns for {:.4} of the driver", self.driven_turns, self.driver_turns),
+            ),
+            (
+                "transmission",
+                format!(
+                    "error {:.2} µm peak to peak, {:.2} % of the speed",
+                    self.transmission_error * 1e6,
+                    100.0 * self.speed_error
+                ),
+            ),
+            clearance_row(self.penetration, self.measurements),
+        ]
     }
 }

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use tesdf::glam::{DVec2, DVec3};
 
 use super::linking::linking_number;
-use super::shared::{Checks, Hinge, Penetration, free_body, positive, unit};
+use super::shared::{Checks, Hinge, Penetration, clearance_row, free_body, positive, unit};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::{Joint, JointKind, MassProperties, System};
 
 /// Chains that are wound on spools hoist a body. The links hold each other by contact alone: of
@@ -128,13 +129,13 @@ impl HoistLink {
     }
 }
 
-impl HoistCriterion {
+impl Criterion for HoistCriterion {
+    const NAME: &str = "hoist";
+    type Tracker = HoistTracker;
+
     /// Checks the values, that the bodies and joints exist, and that nothing but the chains holds
     /// the body.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate(&self, system: &System) -> Result<(), String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         unit(self.axis)?;
         positive([
             ("winding_radius", self.winding_radius),
@@ -154,9 +155,15 @@ impl HoistCriterion {
                 straight + 2.0 * bend_radius
             ));
         }
-        self.find(system).map(|_| ())
+        self.find(system).map(|_| vec![self.body.clone()])
     }
 
+    fn track(&self, system: &System) -> Result<HoistTracker, String> {
+        HoistTracker::new(self, system)
+    }
+}
+
+impl HoistCriterion {
     /// The chains, when the joints are those of a hoist.
     fn find(&self, system: &System) -> Result<Vec<Chain>, String> {
         if self.chains.is_empty() {
@@ -240,9 +247,9 @@ impl HoistTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`HoistCriterion::validate`].
+    /// The same errors as [`HoistCriterion::check`].
     pub fn new(criterion: &HoistCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         let (body, mass) = free_body(system, &criterion.body, "hoist")?;
         let chains = criterion.find(system)?;
         let axis = unit(criterion.axis)?;
@@ -264,8 +271,23 @@ impl HoistTracker {
         })
     }
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+    /// The number of neighbours that do not go once through each other.
+    fn unlinked(&self, system: &System, chain: &Chain) -> usize {
+        let line = |&link: &usize| {
+            let pose = system.states()[link].pose;
+            self.centre_line.iter().map(|p| pose.to_world(*p)).collect::<Vec<_>>()
+        };
+        let lines: Vec<_> = chain.links.iter().map(line).collect();
+        let is_linked =
+            |pair: &[Vec<DVec3>]| linking_number(&pair[0], &pair[1]).is_some_and(|n| n.abs() == 1);
+        lines.windows(2).filter(|pair| !is_linked(pair)).count()
+    }
+}
+
+impl Tracker for HoistTracker {
+    type Report = HoistReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         let pose = system.states()[self.body].pose;
         self.rise = (pose.to_world(self.mass.center) - self.start.0).dot(self.axis);
         self.tilt = self.tilt.max((pose.rotation * self.start.1).angle_between(self.axis));
@@ -278,20 +300,7 @@ impl HoistTracker {
         }
     }
 
-    /// The number of neighbours that do not go once through each other.
-    fn unlinked(&self, system: &System, chain: &Chain) -> usize {
-        let line = |&link: &usize| {
-            let pose = system.states()[link].pose;
-            self.centre_line.iter().map(|p| pose.to_world(*p)).collect::<Vec<_>>()
-        };
-        let lines: Vec<_> = chain.links.iter().map(line).collect();
-        let is_linked =
-            |pair: &[Vec<DVec3>]| linking_number(&pair[0], &pair[1]).is_some_and(|n| n.abs() == 1);
-        lines.windows(2).filter(|pair| !is_linked(pair)).count()
-    }
-
-    /// Compares the run so far with the criterion.
-    pub fn report(&self) -> HoistReport {
+    fn report(&self, _: &System) -> HoistReport {
         let HoistCriterion { link, winding_radius, min_rise, rise_tolerance, max_tilt, .. } = self.criterion;
         let angle = self.angles.iter().sum::<f64>() / self.angles.len() as f64;
         let wound = link.wound_per_radian(winding_radius) * angle;
@@ -329,5 +338,24 @@ impl HoistTracker {
             unlinked,
             failures,
         }
+    }
+}
+
+impl Report for HoistReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        let HoistReport { rise, wound, turns, tilt, unlinked, penetration, measurements, .. } = self;
+        vec![
+            (
+                "hoist",
+                format!("{:.2} mm, {:.2} mm of chain wound in {turns:.3} turns", 1e3 * rise, 1e3 * wound),
+            ),
+            ("level", format!("at most {:.3} mrad of tilt", 1e3 * tilt)),
+            ("links", format!("{unlinked} times two neighbours were not linked")),
+            clearance_row(*penetration, *measurements),
+        ]
     }
 }

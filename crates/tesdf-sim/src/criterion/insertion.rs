@@ -3,7 +3,8 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, body, free_body, positive, unit};
+use super::shared::{Checks, Penetration, body, clearance_row, free_body, positive, unit};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::{MassProperties, System};
 
 /// The body moves along the axis until it seats, stays within its clearance on the way, and comes
@@ -93,12 +94,12 @@ pub struct InsertionReport {
     pub failures: Vec<String>,
 }
 
-impl InsertionCriterion {
+impl Criterion for InsertionCriterion {
+    const NAME: &str = "insertion";
+    type Tracker = InsertionTracker;
+
     /// Checks the values, and that the two bodies exist and the first one is free.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate(&self, system: &System) -> Result<(), String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         unit(self.axis)?;
         positive([
             ("depth", self.depth),
@@ -113,9 +114,15 @@ impl InsertionCriterion {
             ("max_energy_gain", self.max_energy_gain),
             ("check_every", self.check_every),
         ])?;
-        self.find(system).map(|_| ())
+        self.find(system).map(|_| Vec::new())
     }
 
+    fn track(&self, system: &System) -> Result<InsertionTracker, String> {
+        InsertionTracker::new(self, system)
+    }
+}
+
+impl InsertionCriterion {
     fn find(&self, system: &System) -> Result<(usize, MassProperties, InstanceId), String> {
         let (moving, mass) = free_body(system, &self.body, "stop")?;
         let into = body(system, &self.into)?;
@@ -151,9 +158,9 @@ impl InsertionTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`InsertionCriterion::validate`].
+    /// The same errors as [`InsertionCriterion::check`].
     pub fn new(criterion: &InsertionCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         let (body, mass, into) = criterion.find(system)?;
         let axis = unit(criterion.axis)?;
         Ok(Self {
@@ -183,9 +190,12 @@ impl InsertionTracker {
             },
         })
     }
+}
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+impl Tracker for InsertionTracker {
+    type Report = InsertionReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         let InsertionCriterion { depth, depth_tolerance, settled, .. } = self.criterion;
         self.time += time_step;
         let pose = system.states()[self.body].pose;
@@ -214,8 +224,7 @@ impl InsertionTracker {
         }
     }
 
-    /// Compares the run so far with the criterion.
-    pub fn report(&self) -> InsertionReport {
+    fn report(&self, _: &System) -> InsertionReport {
         let mut report = InsertionReport {
             penetration: self.penetration.depth,
             measurements: self.penetration.measurements,
@@ -270,5 +279,31 @@ impl InsertionTracker {
         let (gain, allowed) = (report.energy_gain, self.criterion.max_energy_gain * self.released);
         demand(gain <= allowed, format!("energy gain: {gain:.3e} J; expected at most {allowed:.3e} J"));
         report
+    }
+}
+
+impl Report for InsertionReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        let seated = self.seated_at.map_or("not seated".into(), |time| format!("seated at {time:.4} s"));
+        vec![
+            ("insertion", format!("{:.4} mm, {seated}", self.travel * 1e3)),
+            (
+                "play",
+                format!(
+                    "at most {:.1} µm across the axis and {:.2} mrad of tilt",
+                    self.offset * 1e6,
+                    self.tilt * 1e3
+                ),
+            ),
+            clearance_row(self.penetration, self.measurements),
+            (
+                "energy gain",
+                format!("{:.2e} J; {:.2e} J kinetic when settled", self.energy_gain, self.jitter),
+            ),
+        ]
     }
 }

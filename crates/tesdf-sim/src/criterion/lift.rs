@@ -3,7 +3,8 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, body, free_body, positive, unit};
+use super::shared::{Checks, Penetration, body, clearance_row, free_body, positive, unit};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::joint::{relative, rotation_between};
 use crate::{Mass, MassProperties, State, System};
 
@@ -87,12 +88,12 @@ pub struct LiftReport {
     pub failures: Vec<String>,
 }
 
-impl LiftCriterion {
+impl Criterion for LiftCriterion {
+    const NAME: &str = "lift";
+    type Tracker = LiftTracker;
+
     /// Checks the values, that the bodies exist, and that the lifted one is free and has no joint.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate(&self, system: &System) -> Result<(), String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         unit(self.axis)?;
         positive([
             ("height", self.height),
@@ -104,9 +105,15 @@ impl LiftCriterion {
             ("max_energy_gain", self.max_energy_gain),
             ("check_every", self.check_every),
         ])?;
-        self.find(system).map(|_| ())
+        self.find(system).map(|_| vec![self.body.clone()])
     }
 
+    fn track(&self, system: &System) -> Result<LiftTracker, String> {
+        LiftTracker::new(self, system)
+    }
+}
+
+impl LiftCriterion {
     /// The lifted body, its mass, and the fingers.
     fn find(&self, system: &System) -> Result<(usize, MassProperties, Vec<usize>), String> {
         let (lifted, mass) = free_body(system, &self.body, "lift")?;
@@ -159,9 +166,9 @@ impl LiftTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`LiftCriterion::validate`].
+    /// The same errors as [`LiftCriterion::check`].
     pub fn new(criterion: &LiftCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         let (body, mass, fingers) = criterion.find(system)?;
         let instance = system.bodies()[body].instance;
         let size = system.diagonal(&system.bodies()[body]).map_err(|e| e.to_string())?;
@@ -185,9 +192,12 @@ impl LiftTracker {
             criterion: criterion.clone(),
         })
     }
+}
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+impl Tracker for LiftTracker {
+    type Report = LiftReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         self.time += time_step;
         let states = system.states();
         let lifted = &states[self.body];
@@ -215,8 +225,7 @@ impl LiftTracker {
         }
     }
 
-    /// Compares the run so far with the criterion.
-    pub fn report(&self, system: &System) -> LiftReport {
+    fn report(&self, system: &System) -> LiftReport {
         let LiftCriterion { height, height_tolerance, held_from, max_creep, max_jitter, .. } = self.criterion;
         let seconds = self.time - held_from;
         let is_held = self.held.is_some() && seconds > 1e-9;
@@ -274,4 +283,33 @@ fn velocity_at(system: &System, body: usize, point: DVec3) -> DVec3 {
         Mass::Fixed | Mass::Kinematic => pose.translation,
     };
     linear + angular.cross(point - origin)
+}
+
+impl Report for LiftReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        vec![
+            (
+                "lift",
+                format!(
+                    "{:.4} mm, held within {:.2} µm of the height",
+                    self.rise * 1e3,
+                    self.height_error * 1e6
+                ),
+            ),
+            (
+                "creep",
+                format!(
+                    "{:.2e} mm/s relative to a finger; at most {:.2e} mm/s in a step",
+                    self.creep * 1e3,
+                    self.jitter * 1e3
+                ),
+            ),
+            clearance_row(self.penetration, self.measurements),
+            ("energy gain", format!("{:.2e} J while held", self.energy_gain)),
+        ]
+    }
 }

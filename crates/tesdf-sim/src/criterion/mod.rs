@@ -1,4 +1,4 @@
-//! Success criteria of a run.
+//! Success criteria of a run. Each has a module of its own and a line in `known`.
 mod assembly;
 mod gear_ratio;
 mod hoist;
@@ -7,6 +7,7 @@ mod lift;
 mod linking;
 mod rest;
 mod screw;
+mod section;
 mod separation;
 mod shared;
 mod transmission;
@@ -23,10 +24,15 @@ pub use transmission::{
     EngagedGear, EngagedReport, TransmissionCriterion, TransmissionReport, TransmissionTracker,
 };
 
+use std::fmt;
+
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::System;
-use crate::scene_file::CriterionSection;
+use section::Kind;
+pub use section::{CriterionReport, CriterionSection};
+pub(crate) use section::{Trackers, by_name};
 
 /// How far joints came apart, at any step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -37,137 +43,63 @@ pub struct JointDrift {
     pub angle: f64,
 }
 
-/// Follows the criteria of a scene along a run.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Trackers {
-    screw: Option<ScrewTracker>,
-    rest: Option<RestTracker>,
-    insertion: Option<InsertionTracker>,
-    lift: Option<LiftTracker>,
-    gear_ratio: Option<GearRatioTracker>,
-    separation: Option<SeparationTracker>,
-    hoist: Option<HoistTracker>,
-    transmission: Option<TransmissionTracker>,
-    assembly: Option<AssemblyTracker>,
+/// A success criterion: the table `[criterion.NAME]` of a scene file. [`CriterionSection::add`] makes
+/// a criterion from outside of this crate known.
+pub trait Criterion: Clone + fmt::Debug + Serialize + DeserializeOwned + Send + Sync + 'static {
+    /// The name of its table.
+    const NAME: &str;
+    /// What follows it along a run.
+    type Tracker: Tracker;
+
+    /// Checks the values, and that they match the bodies and joints. Returns the names of the bodies that
+    /// contacts alone may drive, and no script.
+    ///
+    /// # Errors
+    /// A message that names the value that was found and the expected range.
+    fn check(&self, system: &System) -> Result<Vec<String>, String>;
+
+    /// A tracker that starts from the current state of `system`.
+    ///
+    /// # Errors
+    /// The same errors as [`check`](Self::check).
+    fn track(&self, system: &System) -> Result<Self::Tracker, String>;
 }
 
-impl Trackers {
-    /// Trackers that start from the current state of `system`.
-    pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let CriterionSection {
-            screw,
-            rest,
-            insertion,
-            lift,
-            gear_ratio,
-            separation,
-            hoist,
-            transmission,
-            assembly,
-        } = section;
-        Ok(Self {
-            screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
-            rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
-            insertion: insertion
-                .as_ref()
-                .map(|insertion| InsertionTracker::new(insertion, system))
-                .transpose()?,
-            lift: lift.as_ref().map(|lift| LiftTracker::new(lift, system)).transpose()?,
-            gear_ratio: gear_ratio.as_ref().map(|gears| GearRatioTracker::new(gears, system)).transpose()?,
-            separation: separation.as_ref().map(|of| SeparationTracker::new(of, system)).transpose()?,
-            hoist: hoist.as_ref().map(|hoist| HoistTracker::new(hoist, system)).transpose()?,
-            transmission: transmission
-                .as_ref()
-                .map(|gears| TransmissionTracker::new(gears, system))
-                .transpose()?,
-            assembly: assembly.as_ref().map(|parts| AssemblyTracker::new(parts, system)).transpose()?,
-        })
-    }
+/// Follows a criterion along a run.
+pub trait Tracker: Clone + fmt::Debug + Send + Sync + 'static {
+    /// The result.
+    type Report: Report;
 
     /// Records the state after a step of `time_step` seconds.
-    pub(crate) fn observe(&mut self, system: &System, time_step: f64) {
-        if let Some(screw) = &mut self.screw {
-            screw.observe(system, time_step);
-        }
-        if let Some(rest) = &mut self.rest {
-            rest.observe(system, time_step);
-        }
-        if let Some(insertion) = &mut self.insertion {
-            insertion.observe(system, time_step);
-        }
-        if let Some(lift) = &mut self.lift {
-            lift.observe(system, time_step);
-        }
-        if let Some(gears) = &mut self.gear_ratio {
-            gears.observe(system, time_step);
-        }
-        if let Some(separation) = &mut self.separation {
-            separation.observe(system, time_step);
-        }
-        if let Some(hoist) = &mut self.hoist {
-            hoist.observe(system, time_step);
-        }
-        if let Some(transmission) = &mut self.transmission {
-            transmission.observe(system, time_step);
-        }
-        if let Some(assembly) = &mut self.assembly {
-            assembly.observe(system, time_step);
-        }
-    }
+    fn observe(&mut self, system: &System, time_step: f64);
 
-    /// Compares the run so far with the criteria. `failures` are added to those of each criterion.
-    pub(crate) fn report(&self, system: &System, failures: &[String]) -> Reports {
-        let mut reports = Reports {
-            screw: self.screw.as_ref().map(|screw| screw.report(system)),
-            rest: self.rest.as_ref().map(RestTracker::report),
-            insertion: self.insertion.as_ref().map(InsertionTracker::report),
-            lift: self.lift.as_ref().map(|lift| lift.report(system)),
-            gear_ratio: self.gear_ratio.as_ref().map(GearRatioTracker::report),
-            separation: self.separation.as_ref().map(SeparationTracker::report),
-            hoist: self.hoist.as_ref().map(HoistTracker::report),
-            transmission: self.transmission.as_ref().map(TransmissionTracker::report),
-            assembly: self.assembly.as_ref().map(|parts| parts.report(system)),
-        };
-        reports.failures_mut().for_each(|of_one| of_one.extend_from_slice(failures));
-        reports
-    }
+    /// Compares the run so far with the criterion.
+    fn report(&self, system: &System) -> Self::Report;
 }
 
-/// Results of the criteria of a scene.
-#[derive(Clone, Debug)]
-pub(crate) struct Reports {
-    pub(crate) screw: Option<ScrewReport>,
-    pub(crate) rest: Option<RestReport>,
-    pub(crate) insertion: Option<InsertionReport>,
-    pub(crate) lift: Option<LiftReport>,
-    pub(crate) gear_ratio: Option<GearRatioReport>,
-    pub(crate) separation: Option<SeparationReport>,
-    pub(crate) hoist: Option<HoistReport>,
-    pub(crate) transmission: Option<TransmissionReport>,
-    pub(crate) assembly: Option<AssemblyReport>,
+/// Names and values, as people read them.
+pub type Rows = Vec<(&'static str, String)>;
+
+/// Result of a criterion, with the requirements that the run did not meet.
+pub trait Report: Clone + fmt::Debug + Serialize + Send + Sync + 'static {
+    /// The requirements that the run did not meet; empty when it passed.
+    fn failures(&mut self) -> &mut Vec<String>;
+
+    /// The measured values.
+    fn rows(&self) -> Rows;
 }
 
-impl Reports {
-    /// Whether all criteria hold; `None` when there are none.
-    pub(crate) fn passed(&mut self) -> Option<bool> {
-        let mut failures = self.failures_mut().peekable();
-        failures.peek().is_some().then(|| failures.all(|failures| failures.is_empty()))
-    }
-
-    fn failures_mut(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
-        let Self { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly } =
-            self;
-        let screw = screw.as_mut().map(|screw| &mut screw.failures);
-        let rest = rest.as_mut().map(|rest| &mut rest.failures);
-        let insertion = insertion.as_mut().map(|insertion| &mut insertion.failures);
-        let lift = lift.as_mut().map(|lift| &mut lift.failures);
-        let gear_ratio = gear_ratio.as_mut().map(|gears| &mut gears.failures);
-        let separation = separation.as_mut().map(|separation| &mut separation.failures);
-        let hoist = hoist.as_mut().map(|hoist| &mut hoist.failures);
-        let transmission = transmission.as_mut().map(|gears| &mut gears.failures);
-        let assembly = assembly.as_mut().map(|parts| &mut parts.failures);
-        [screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly]
-            .into_iter()
-            .flatten()
-    }
+/// The criteria of this crate.
+fn known() -> Vec<Kind> {
+    vec![
+        Kind::of::<AssemblyCriterion>(),
+        Kind::of::<GearRatioCriterion>(),
+        Kind::of::<HoistCriterion>(),
+        Kind::of::<InsertionCriterion>(),
+        Kind::of::<LiftCriterion>(),
+        Kind::of::<RestCriterion>(),
+        Kind::of::<ScrewCriterion>(),
+        Kind::of::<SeparationCriterion>(),
+        Kind::of::<TransmissionCriterion>(),
+    ]
 }

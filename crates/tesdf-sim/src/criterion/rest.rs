@@ -2,6 +2,7 @@
 use serde::{Deserialize, Serialize};
 use tesdf::collide::{CollideError, Pose};
 
+use super::{Criterion, Report, Rows, Tracker};
 use crate::{Mass, System};
 
 /// Every free body stays where it is, and the bodies gain no energy.
@@ -33,19 +34,23 @@ pub struct RestReport {
     pub failures: Vec<String>,
 }
 
-impl RestCriterion {
+impl Criterion for RestCriterion {
+    const NAME: &str = "rest";
+    type Tracker = RestTracker;
+
     /// Checks the values.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate(&self) -> Result<(), String> {
+    fn check(&self, _: &System) -> Result<Vec<String>, String> {
         let range = |x: f64| x >= 0.0 && x.is_finite();
         let values =
             [("after", self.after), ("max_drift", self.max_drift), ("max_energy_gain", self.max_energy_gain)];
         match values.into_iter().find(|&(_, value)| !range(value)) {
             Some((key, value)) => Err(format!("{key} is {value}; expected a finite number, 0 or greater")),
-            None => Ok(()),
+            None => Ok(Vec::new()),
         }
+    }
+
+    fn track(&self, system: &System) -> Result<RestTracker, String> {
+        RestTracker::new(self, system)
     }
 }
 
@@ -68,9 +73,9 @@ impl RestTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`RestCriterion::validate`].
+    /// The same errors as [`RestCriterion::check`].
     pub fn new(criterion: &RestCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate()?;
+        criterion.check(system)?;
         let diagonals = system.bodies().iter().map(|body| system.diagonal(body));
         let sizes = diagonals.collect::<Result<_, CollideError>>();
         let sizes = sizes.map_err(|e| e.to_string())?;
@@ -95,9 +100,12 @@ impl RestTracker {
             self.start = Some((poses, system.kinetic_energy() + system.potential_energy()));
         }
     }
+}
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+impl Tracker for RestTracker {
+    type Report = RestReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         self.time += time_step;
         let Some((poses, energy)) = &self.start else { return self.begin(system) };
         let gain = system.kinetic_energy() + system.potential_energy() - energy;
@@ -115,8 +123,7 @@ impl RestTracker {
         }
     }
 
-    /// Compares the run so far with the criterion.
-    pub fn report(&self) -> RestReport {
+    fn report(&self, _: &System) -> RestReport {
         let RestCriterion { after, max_drift, max_energy_gain } = self.criterion;
         let mut failures = Vec::new();
         if self.body.is_empty() {
@@ -133,5 +140,19 @@ impl RestTracker {
         }
         let (body, drift, energy_gain) = (self.body.clone(), self.drift, self.energy_gain);
         RestReport { body, drift, energy_gain, failures }
+    }
+}
+
+impl Report for RestReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        let nanometres = self.drift * 1e9;
+        vec![
+            ("rest", format!("{} moves most, by at most {nanometres:.3} nm", self.body)),
+            ("energy gain", format!("{:.2e} J", self.energy_gain)),
+        ]
     }
 }

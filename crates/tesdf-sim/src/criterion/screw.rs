@@ -6,6 +6,7 @@ use tesdf::collide::Pose;
 use tesdf::glam::DVec3;
 
 use super::shared::{free_body, positive, unit};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::{MassProperties, System};
 
 /// The body moves along a thread: at every step its travel along the axis differs from its number
@@ -59,12 +60,12 @@ pub struct ScrewReport {
     pub failures: Vec<String>,
 }
 
-impl ScrewCriterion {
+impl Criterion for ScrewCriterion {
+    const NAME: &str = "screw";
+    type Tracker = ScrewTracker;
+
     /// Checks the values, and that the body exists and is free.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate(&self, system: &System) -> Result<(), String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         unit(self.axis)?;
         positive([
             ("pitch", self.pitch),
@@ -76,9 +77,15 @@ impl ScrewCriterion {
             let found = self.min_acceleration;
             return Err(format!("min_acceleration is {found}; expected a number, 0 or greater"));
         }
-        self.find(system).map(|_| ())
+        self.find(system).map(|_| Vec::new())
     }
 
+    fn track(&self, system: &System) -> Result<ScrewTracker, String> {
+        ScrewTracker::new(self, system)
+    }
+}
+
+impl ScrewCriterion {
     fn find(&self, system: &System) -> Result<(usize, MassProperties), String> {
         free_body(system, &self.body, "turn")
     }
@@ -114,9 +121,9 @@ impl ScrewTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`ScrewCriterion::validate`].
+    /// The same errors as [`ScrewCriterion::check`].
     pub fn new(criterion: &ScrewCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         let (body, mass) = criterion.find(system)?;
         let axis = unit(criterion.axis)?;
         let last = system.states()[body].pose;
@@ -136,8 +143,33 @@ impl ScrewTracker {
         })
     }
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+    /// Travel along the axis so far, m.
+    pub fn travel(&self) -> f64 {
+        self.path.last().map_or(0.0, |(_, travel)| *travel)
+    }
+
+    /// Turns about the axis so far.
+    pub fn turns(&self) -> f64 {
+        self.turns
+    }
+
+    /// Slope of the velocity over the second half of the run, by least squares.
+    fn acceleration(&self) -> f64 {
+        let velocities: Vec<(f64, f64)> = self.path[self.path.len() / 2..]
+            .windows(2)
+            .map(|w| (0.5 * (w[0].0 + w[1].0), (w[1].1 - w[0].1) / (w[1].0 - w[0].0)))
+            .collect();
+        let n = velocities.len() as f64;
+        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| velocities.iter().map(f).sum::<f64>() / n;
+        let (t, v) = (mean(&|p| p.0), mean(&|p| p.1));
+        mean(&|p| (p.0 - t) * (p.1 - v)) / mean(&|p| (p.0 - t).powi(2))
+    }
+}
+
+impl Tracker for ScrewTracker {
+    type Report = ScrewReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         let pose = system.states()[self.body].pose;
         let turn = (pose.rotation * self.last.rotation.inverse()).to_scaled_axis().dot(self.axis);
         self.turns += turn / TAU;
@@ -150,18 +182,7 @@ impl ScrewTracker {
         self.largest_pitch_error = self.largest_pitch_error.max(error);
     }
 
-    /// Travel along the axis so far, m.
-    pub fn travel(&self) -> f64 {
-        self.path.last().map_or(0.0, |(_, travel)| *travel)
-    }
-
-    /// Turns about the axis so far.
-    pub fn turns(&self) -> f64 {
-        self.turns
-    }
-
-    /// Compares the run so far with the criterion.
-    pub fn report(&self, system: &System) -> ScrewReport {
+    fn report(&self, system: &System) -> ScrewReport {
         let kinetic = system.kinetic_energy();
         let criterion = &self.criterion;
         let mut report = ScrewReport {
@@ -206,16 +227,33 @@ impl ScrewTracker {
         );
         report
     }
+}
 
-    /// Slope of the velocity over the second half of the run, by least squares.
-    fn acceleration(&self) -> f64 {
-        let velocities: Vec<(f64, f64)> = self.path[self.path.len() / 2..]
-            .windows(2)
-            .map(|w| (0.5 * (w[0].0 + w[1].0), (w[1].1 - w[0].1) / (w[1].0 - w[0].0)))
-            .collect();
-        let n = velocities.len() as f64;
-        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| velocities.iter().map(f).sum::<f64>() / n;
-        let (t, v) = (mean(&|p| p.0), mean(&|p| p.1));
-        mean(&|p| (p.0 - t) * (p.1 - v)) / mean(&|p| (p.0 - t).powi(2))
+impl Report for ScrewReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        vec![
+            (
+                "screw",
+                format!(
+                    "{:.4} mm and {:.4} turns, at most {:.1} µm from the pitch",
+                    self.travel * 1e3,
+                    self.turns,
+                    self.largest_pitch_error * 1e6
+                ),
+            ),
+            (
+                "acceleration",
+                format!(
+                    "{:.3e} m/s², ideal screw {:.3e} m/s²; {:.1} % of the ideal travel",
+                    self.acceleration,
+                    self.analytic_acceleration,
+                    100.0 * self.travel_of_analytic
+                ),
+            ),
+        ]
     }
 }

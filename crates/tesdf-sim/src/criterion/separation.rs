@@ -2,6 +2,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::shared::{Penetration, positive};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::{Mass, System};
 
 /// Bodies that overlap come apart within a time, and without a kick.
@@ -45,12 +46,12 @@ pub struct SeparationReport {
     pub failures: Vec<String>,
 }
 
-impl SeparationCriterion {
+impl Criterion for SeparationCriterion {
+    const NAME: &str = "separation";
+    type Tracker = SeparationTracker;
+
     /// Checks the values.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate(&self, system: &System) -> Result<(), String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         positive([("max_kinetic_energy", self.max_kinetic_energy), ("tolerance", self.tolerance)])?;
         for (k, [time, depth]) in self.limits.iter().enumerate() {
             if !(time.is_finite() && *time >= 0.0 && depth.is_finite() && *depth > 0.0) {
@@ -63,8 +64,12 @@ impl SeparationCriterion {
         match (self.limits.is_empty(), system.gravity.length() > 0.0) {
             (true, _) => Err("limits is empty; expected at least one pair of a time and a depth".into()),
             (_, false) => Err("gravity is 0; without it there is no energy to compare with".into()),
-            _ => Ok(()),
+            _ => Ok(Vec::new()),
         }
+    }
+
+    fn track(&self, system: &System) -> Result<SeparationTracker, String> {
+        SeparationTracker::new(self, system)
     }
 }
 
@@ -82,17 +87,26 @@ impl SeparationTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`SeparationCriterion::validate`].
+    /// The same errors as [`SeparationCriterion::check`].
     pub fn new(criterion: &SeparationCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         let criterion = criterion.clone();
         let mut tracker = Self { criterion, time: 0.0, measured: Vec::new(), kinetic_energy: 0.0 };
         tracker.measure(system);
         Ok(tracker)
     }
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+    fn measure(&mut self, system: &System) {
+        let mut penetration = Penetration::default();
+        penetration.measure_all(system, self.criterion.tolerance);
+        self.measured.push((self.time, penetration));
+    }
+}
+
+impl Tracker for SeparationTracker {
+    type Report = SeparationReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         self.time += time_step;
         let masses = system.bodies().iter().map(|body| match body.mass {
             Mass::Free(mass) => mass.mass,
@@ -104,14 +118,7 @@ impl SeparationTracker {
         self.measure(system);
     }
 
-    fn measure(&mut self, system: &System) {
-        let mut penetration = Penetration::default();
-        penetration.measure_all(system, self.criterion.tolerance);
-        self.measured.push((self.time, penetration));
-    }
-
-    /// Compares the run so far with the criterion.
-    pub fn report(&self) -> SeparationReport {
+    fn report(&self, _: &System) -> SeparationReport {
         let mut report = SeparationReport {
             penetration: self.measured.iter().map(|(_, found)| found.depth).collect(),
             kinetic_energy: self.kinetic_energy,
@@ -134,5 +141,23 @@ impl SeparationTracker {
             ));
         }
         report
+    }
+}
+
+impl Report for SeparationReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        let micrometres = |depth: &f64| format!("{:.1}", 1e6 * depth);
+        let found = &self.penetration;
+        let shown: Vec<String> =
+            found.iter().step_by(found.len().div_ceil(8).max(1)).map(micrometres).collect();
+        let last = found.last().map_or("none".into(), micrometres);
+        vec![
+            ("separation", format!("{} µm deep over the run, {last} µm at the end", shown.join(", "))),
+            ("kinetic", format!("at most {:.3} of the energy of free fall", self.kinetic_energy)),
+        ]
     }
 }

@@ -229,3 +229,13 @@ fn angle(system: &System, joint: usize) -> f64 {
     let joint = &system.joints()[joint];
     joint.coordinate(System::poses_of(joint, system.states()))
 }
+
+/// The row of the exact clearance in the text of a report.
+pub(super) fn clearance_row(penetration: f64, measurements: usize) -> (&'static str, String) {
+    let plural = if measurements == 1 { "" } else { "s" };
+    let penetration = 1e6 * penetration;
+    (
+        "clearance",
+        format!("at most {penetration:.3} µm of penetration, in {measurements} exact measurement{plural}"),
+    )
+}

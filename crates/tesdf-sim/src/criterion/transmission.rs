@@ -3,7 +3,8 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::shared::{Checks, Hinge, Penetration, positive};
+use super::shared::{Checks, Hinge, Penetration, clearance_row, positive};
+use super::{Criterion, Report, Rows, Tracker};
 use crate::{Drive, Mass, Motor, System};
 
 /// A gearbox turns its output shaft at the ratio of each gear in turn, by contact alone, and not in
@@ -86,13 +87,13 @@ pub struct EngagedReport {
     pub transmission_error: f64,
 }
 
-impl TransmissionCriterion {
+impl Criterion for TransmissionCriterion {
+    const NAME: &str = "transmission";
+    type Tracker = TransmissionTracker;
+
     /// Checks the values, that the joints are hinges, and that nothing but a load acts on the
     /// output shaft. Returns the name of its body.
-    ///
-    /// # Errors
-    /// A message that names the value that was found and the expected range.
-    pub fn validate<'a>(&self, system: &'a System) -> Result<&'a str, String> {
+    fn check(&self, system: &System) -> Result<Vec<String>, String> {
         positive([
             ("max_ratio_error", self.max_ratio_error),
             ("min_turns", self.min_turns),
@@ -131,7 +132,9 @@ impl TransmissionCriterion {
             ));
         }
         match output.motor(system) {
-            None | Some(Motor { drive: Drive::Force(_) | Drive::Velocity(0.0), .. }) => Ok(&body.name),
+            None | Some(Motor { drive: Drive::Force(_) | Drive::Velocity(0.0), .. }) => {
+                Ok(vec![body.name.clone()])
+            }
             Some(Motor { drive, .. }) => Err(format!(
                 "the motor of joint {} has the drive {drive:?}; expected none, a torque, or the velocity 0 of a brake",
                 self.output
@@ -139,6 +142,12 @@ impl TransmissionCriterion {
         }
     }
 
+    fn track(&self, system: &System) -> Result<TransmissionTracker, String> {
+        TransmissionTracker::new(self, system)
+    }
+}
+
+impl TransmissionCriterion {
     fn find(&self, system: &System) -> Result<[Hinge; 2], String> {
         Ok([Hinge::new(system, &self.input)?, Hinge::new(system, &self.output)?])
     }
@@ -169,9 +178,9 @@ impl TransmissionTracker {
     /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// The same errors as [`TransmissionCriterion::validate`].
+    /// The same errors as [`TransmissionCriterion::check`].
     pub fn new(criterion: &TransmissionCriterion, system: &System) -> Result<Self, String> {
-        criterion.validate(system)?;
+        criterion.check(system)?;
         Ok(Self {
             hinges: criterion.find(system)?,
             time: 0.0,
@@ -182,9 +191,12 @@ impl TransmissionTracker {
             criterion: criterion.clone(),
         })
     }
+}
 
-    /// Records the state after a step of `time_step` seconds.
-    pub fn observe(&mut self, system: &System, time_step: f64) {
+impl Tracker for TransmissionTracker {
+    type Report = TransmissionReport;
+
+    fn observe(&mut self, system: &System, time_step: f64) {
         let begin = self.time;
         self.time += time_step;
         let end = self.time;
@@ -208,8 +220,7 @@ impl TransmissionTracker {
         }
     }
 
-    /// Compares the run so far with the criterion.
-    pub fn report(&self) -> TransmissionReport {
+    fn report(&self, _: &System) -> TransmissionReport {
         let TransmissionCriterion { max_ratio_error, min_turns, max_neutral_turns, .. } = self.criterion;
         let allowed_error = self.criterion.max_transmission_error;
         let mut failures = self.penetration.failures(self.criterion.max_penetration);
@@ -268,5 +279,25 @@ impl TransmissionTracker {
             measurements: self.penetration.measurements,
             failures,
         }
+    }
+}
+
+impl Report for TransmissionReport {
+    fn failures(&mut self) -> &mut Vec<String> {
+        &mut self.failures
+    }
+
+    fn rows(&self) -> Rows {
+        let TransmissionReport { gears, neutral, penetration, measurements, .. } = self;
+        let of_gear = |gear: &EngagedReport| {
+            let ratio = gear.ratio.map_or("none".into(), |ratio| format!("{ratio:.6}"));
+            format!("{ratio} in {:.2} turns, error {:.1} µm", gear.turns, 1e6 * gear.transmission_error)
+        };
+        let mut rows: Vec<_> = gears.iter().map(|gear| ("ratio", of_gear(gear))).collect();
+        rows.extend(neutral.iter().map(|[input, output]| {
+            ("neutral", format!("{output:.5} turns of the output, {input:.2} of the input"))
+        }));
+        rows.push(clearance_row(*penetration, *measurements));
+        rows
     }
 }

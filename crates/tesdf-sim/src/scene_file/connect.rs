@@ -3,8 +3,7 @@ use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 
 use super::read::LoadedScene;
-use super::{CriterionSection, JointSection, SceneError};
-use crate::criterion::{LiftCriterion, RestCriterion};
+use super::{JointSection, SceneError};
 use crate::script::Scripts;
 use crate::{Joint, System};
 
@@ -36,41 +35,12 @@ impl LoadedScene {
 
     /// Checks that the criteria match the bodies, joints and scripts.
     pub(super) fn check_criteria(&self, system: &System) -> Result<(), SceneError> {
-        let CriterionSection {
-            screw,
-            rest,
-            insertion,
-            lift,
-            gear_ratio,
-            separation,
-            hoist,
-            transmission,
-            assembly,
-        } = &self.scene.criterion;
         let free = |body: &str| match self.scene.scripts.iter().any(|s| s.body.as_deref() == Some(body)) {
             true => Err(format!("a script drives body {body}; only contacts may, so take it out")),
             false => Ok(()),
         };
-        let of = |c: &LiftCriterion| c.validate(system).and_then(|()| free(&c.body));
-        let checks = [
-            ("screw", screw.as_ref().map(|c| c.validate(system))),
-            ("rest", rest.as_ref().map(RestCriterion::validate)),
-            ("insertion", insertion.as_ref().map(|c| c.validate(system))),
-            ("lift", lift.as_ref().map(of)),
-            ("gear_ratio", gear_ratio.as_ref().map(|c| free(c.validate(system)?))),
-            ("separation", separation.as_ref().map(|c| c.validate(system))),
-            ("transmission", transmission.as_ref().map(|c| free(c.validate(system)?))),
-            (
-                "assembly",
-                assembly.as_ref().map(|c| c.validate(system)?.iter().try_for_each(|part| free(part))),
-            ),
-            ("hoist", hoist.as_ref().map(|c| c.validate(system).and_then(|()| free(&c.body)))),
-        ];
-        for (name, check) in checks {
-            let at = |reason| self.value(&format!("criterion.{name}"), reason);
-            check.unwrap_or(Ok(())).map_err(at)?;
-        }
-        Ok(())
+        let at = |(name, reason): (String, String)| self.value(&format!("criterion.{name}"), reason);
+        self.scene.criterion.check(system, free).map_err(at)
     }
 }
 

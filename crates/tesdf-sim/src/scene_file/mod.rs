@@ -70,10 +70,7 @@ pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
-use crate::criterion::{
-    AssemblyCriterion, GearRatioCriterion, HoistCriterion, InsertionCriterion, LiftCriterion, RestCriterion,
-    ScrewCriterion, SeparationCriterion, TransmissionCriterion,
-};
+use crate::criterion::CriterionSection;
 use crate::newton::NewtonOptions;
 use crate::plan::PlanSection;
 use crate::script::Script;
@@ -334,28 +331,4 @@ pub struct RecordSection {
     /// Contacts are recorded at every step whose number, from 0, is a multiple of this value; 0
     /// records none. A contact takes 44 bytes.
     pub contacts_every: u32,
-}
-
-/// The success criteria of a run. Every criterion that is given must hold.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CriterionSection {
-    /// A body must move along a thread.
-    pub screw: Option<ScrewCriterion>,
-    /// The bodies must stay where they are.
-    pub rest: Option<RestCriterion>,
-    /// A body must slide into another one and seat.
-    pub insertion: Option<InsertionCriterion>,
-    /// Fingers must lift a body and hold it.
-    pub lift: Option<LiftCriterion>,
-    /// A gear must turn another one.
-    pub gear_ratio: Option<GearRatioCriterion>,
-    /// Bodies that begin deep in each other must come apart.
-    pub separation: Option<SeparationCriterion>,
-    /// Chains on spools must hoist a body.
-    pub hoist: Option<HoistCriterion>,
-    /// A gearbox must turn its output shaft at the ratio of each gear.
-    pub transmission: Option<TransmissionCriterion>,
-    /// Parts must end in their places, held by contact alone.
-    pub assembly: Option<AssemblyCriterion>,
 }

@@ -8,7 +8,7 @@ use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::write;
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_parts::{Nut, Resolution, Size, Thread};
-use tesdf_sim::criterion::{AssemblyReport, AssemblyTracker};
+use tesdf_sim::criterion::{AssemblyCriterion, AssemblyReport, AssemblyTracker, Tracker};
 use tesdf_sim::record::{InterruptedRun, RunJournal, RunOrigin};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Dynamics, PartialRun, RunRecord, State, Summary, System, Wrench, simulate_from};
@@ -52,7 +52,7 @@ fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
 
 fn failures(summary: &Summary) -> String {
     assert_eq!(summary.passed, Some(false));
-    summary.assembly.as_ref().unwrap().failures.join("\n")
+    summary.report::<AssemblyReport>().unwrap().failures.join("\n")
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn failures(summary: &Summary) -> String {
 fn a_peg_and_a_nut_are_assembled() {
     let (_, summary) = run(|_| ());
     assert_eq!(summary.passed, Some(true), "{summary:?}");
-    let assembly = summary.assembly.as_ref().unwrap();
+    let assembly = summary.report::<AssemblyReport>().unwrap();
     let [peg, nut] = assembly.parts.as_slice() else { panic!("{assembly:?}") };
     assert_eq!((assembly.assembled, peg.name.as_str(), nut.name.as_str()), (2, "peg0", "nut0"));
     assert!(nut.turns.unwrap() > 2.0 && nut.pitch_error.unwrap() > 1e-5, "{nut:?}");
@@ -93,7 +93,7 @@ fn a_nut_of_another_pitch_fails() {
     let nut = Nut { thread: Thread { pitch: 1.5e-3, ..m16.thread() }, clearance: 1e-4, ..Nut::iso_4032(m16) };
     write(&file, nut.mesh(Resolution::Segments(48)).unwrap().mesh()).unwrap();
     let (_, summary) = run(|loaded| assert!(loaded.replace_geometry("nut0", &file)));
-    let assembly = summary.assembly.as_ref().unwrap();
+    let assembly = summary.report::<AssemblyReport>().unwrap();
     assert_eq!(assembly.assembled, 1, "{assembly:?}");
     let failures = failures(&summary);
     assert!(failures.contains("nut0") && !failures.contains("peg0"), "{failures}");
@@ -165,7 +165,7 @@ fn report(change: impl Fn(&mut System, f64)) -> AssemblyReport {
     let loaded = load(balls());
     let mut system = loaded.system().unwrap();
     let mut tracker =
-        AssemblyTracker::new(loaded.scene.criterion.assembly.as_ref().unwrap(), &system).unwrap();
+        AssemblyTracker::new(&loaded.scene.criterion.get::<AssemblyCriterion>().unwrap(), &system).unwrap();
     let start = system.states().to_vec();
     let [peg, hole, nut, bolt] = ["peg0", "hole0", "nut0", "bolt0"].map(|name| find(&system, name));
     for step in 1..=100 {

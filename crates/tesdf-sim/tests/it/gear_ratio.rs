@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, clearance};
 use tesdf::glam::{DQuat, DVec3};
-use tesdf_sim::criterion::{GearRatioReport, GearRatioTracker};
+use tesdf_sim::criterion::{GearRatioCriterion, GearRatioReport, GearRatioTracker, Tracker};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Drive, Mass, Motor, RunRecord, Summary, System};
 
@@ -19,7 +19,7 @@ fn scene() -> (LoadedScene, System) {
         .get_or_init(|| {
             crate::support::scene("gear-pair", |loaded| {
                 loaded.scene.duration = 1.25;
-                loaded.scene.criterion.gear_ratio.as_mut().unwrap().min_turns = 1.0;
+                loaded.scene.criterion.edit(|c: &mut GearRatioCriterion| c.min_turns = 1.0).unwrap();
             })
         })
         .clone()
@@ -70,10 +70,14 @@ fn the_gears_turn_at_the_ratio_of_their_teeth() {
         let (_, summary) = run(|loaded, _| {
             loaded.scene.detector.mode = mode;
             loaded.scene.duration = duration;
-            loaded.scene.criterion.gear_ratio.as_mut().unwrap().min_turns = 0.9 * duration - 0.14;
+            loaded
+                .scene
+                .criterion
+                .edit(|c: &mut GearRatioCriterion| c.min_turns = 0.9 * duration - 0.14)
+                .unwrap();
         });
         assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
-        let gears = summary.gear_ratio.as_ref().unwrap();
+        let gears = summary.report::<GearRatioReport>().unwrap();
         assert!(gears.penetration < 1e-6 && gears.measurements >= 2, "{gears:?}");
         assert!(summary.joint_drift.unwrap().distance < 1e-9, "{summary:?}");
         // Both gears turn at 6 rad/s, up to their transmission error.
@@ -93,9 +97,9 @@ fn the_transmission_error_is_that_of_the_meshes() {
     assert!((1.4e-5..1.7e-5).contains(&expected), "{expected}");
     let (_, summary) = run(|loaded, _| {
         (loaded.scene.time_step, loaded.scene.duration) = (1e-3, 0.4);
-        loaded.scene.criterion.gear_ratio.as_mut().unwrap().min_turns = 0.2;
+        loaded.scene.criterion.edit(|c: &mut GearRatioCriterion| c.min_turns = 0.2).unwrap();
     });
-    let gears = summary.gear_ratio.as_ref().unwrap();
+    let gears = summary.report::<GearRatioReport>().unwrap();
     assert_eq!(summary.passed, Some(true), "{summary:?}");
     assert!((gears.transmission_error - expected).abs() < 1e-6, "{expected}: {gears:?}");
 }
@@ -104,14 +108,14 @@ fn the_transmission_error_is_that_of_the_meshes() {
 fn without_contacts_or_with_a_load_that_drives_the_criterion_fails() {
     let (_, off) = run(|loaded, _| loaded.scene.detector.mode = DetectorMode::Off);
     assert_eq!(off.passed, Some(false));
-    let gears = off.gear_ratio.unwrap();
+    let gears = off.report::<GearRatioReport>().unwrap();
     assert!(gears.driven_turns > 1000.0, "{gears:?}");
-    assert_eq!(names(&gears), ["penetration", "turns", "ratio", "transmission error", "speed", "load"]);
+    assert_eq!(names(gears), ["penetration", "turns", "ratio", "transmission error", "speed", "load"]);
 
     let helping = Motor { drive: Drive::Force(-0.5), limit: 0.5 };
     let (_, helped) = run(|_, system| system.set_motor(1, Some(helping)).unwrap());
     assert_eq!(helped.passed, Some(false));
-    assert_eq!(names(&helped.gear_ratio.unwrap()), ["load"]);
+    assert_eq!(names(helped.report::<GearRatioReport>().unwrap()), ["load"]);
 }
 
 #[test]
@@ -127,7 +131,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 /// The report of gears with these angles and speeds after each step of 10 ms.
 fn report(angle: impl Fn(f64) -> [f64; 2], speed: [f64; 2]) -> GearRatioReport {
     let (loaded, mut system) = scene();
-    let criterion = loaded.scene.criterion.gear_ratio.as_ref().unwrap();
+    let criterion = &loaded.scene.criterion.get::<GearRatioCriterion>().unwrap();
     let mut tracker = GearRatioTracker::new(criterion, &system).unwrap();
     let start = system.states().to_vec();
     for step in 1..=125 {
@@ -140,7 +144,7 @@ fn report(angle: impl Fn(f64) -> [f64; 2], speed: [f64; 2]) -> GearRatioReport {
         system.set_states(states).unwrap();
         tracker.observe(&system, 0.01);
     }
-    tracker.report()
+    tracker.report(&system)
 }
 
 #[test]

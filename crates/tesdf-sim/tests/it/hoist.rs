@@ -2,6 +2,7 @@
 
 use tesdf::mesh::write;
 use tesdf_parts::{Resolution, Spool};
+use tesdf_sim::criterion::HoistReport;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{RunRecord, Summary};
 
@@ -50,7 +51,7 @@ fn run_loaded(loaded: &LoadedScene) -> (RunRecord, Summary) {
 }
 
 fn failures(summary: &Summary) -> String {
-    summary.hoist.as_ref().unwrap().failures.join("\n")
+    summary.report::<HoistReport>().unwrap().failures.join("\n")
 }
 
 #[test]
@@ -62,7 +63,7 @@ fn the_platform_rises_the_same_on_any_number_of_threads() {
     };
     let (record, summary) = on(1);
     assert_eq!(summary.passed, Some(true), "{summary:?}");
-    let hoist = summary.hoist.as_ref().unwrap();
+    let hoist = summary.report::<HoistReport>().unwrap();
     assert!(hoist.measurements >= 2 && hoist.turns > 0.05, "{hoist:?}");
     for threads in [2, 8] {
         let (other, again) = on(threads);

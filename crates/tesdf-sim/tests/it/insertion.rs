@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 
 use tesdf::glam::{DQuat, DVec3};
-use tesdf_sim::criterion::{InsertionReport, InsertionTracker};
+use tesdf_sim::criterion::{InsertionCriterion, InsertionReport, InsertionTracker, Tracker};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{State, Summary, System};
 
@@ -25,7 +25,7 @@ fn the_peg_slides_into_the_hole_and_seats() {
     for time_step in [3e-3, 5e-3] {
         let summary = run(|loaded| loaded.scene.time_step = time_step);
         assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
-        let found = summary.insertion.unwrap();
+        let found = summary.report::<InsertionReport>().unwrap();
         assert!(found.measurements >= 9, "{found:?}");
         // The peg leans on the wall: it moves across the axis by at least the clearance.
         assert!(found.offset > 0.9e-4, "{found:?}");
@@ -36,7 +36,7 @@ fn the_peg_slides_into_the_hole_and_seats() {
 fn without_contacts_the_criterion_fails() {
     let summary = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
     assert_eq!(summary.passed, Some(false));
-    let found = summary.insertion.unwrap();
+    let found = summary.report::<InsertionReport>().unwrap();
     assert!(found.travel > 0.02 && found.penetration > 1e-3, "{found:?}");
     for name in ["tunnelling", "penetration", "jitter"] {
         assert!(found.failures.iter().any(|f| f.starts_with(&format!("{name}: "))), "{name}: {found:?}");
@@ -46,14 +46,14 @@ fn without_contacts_the_criterion_fails() {
 /// The names of the failures of a peg with this state after each step of 25 ms.
 fn names(state: impl Fn(State, f64) -> State) -> Vec<String> {
     let (loaded, mut system) = scene();
-    let criterion = loaded.scene.criterion.insertion.as_ref().unwrap();
+    let criterion = &loaded.scene.criterion.get::<InsertionCriterion>().unwrap();
     let mut tracker = InsertionTracker::new(criterion, &system).unwrap();
     let start = system.states()[1];
     for step in 1..=10 {
         system.set_state(1, state(start, 0.025 * f64::from(step))).unwrap();
         tracker.observe(&system, 0.025);
     }
-    let InsertionReport { failures, .. } = tracker.report();
+    let InsertionReport { failures, .. } = tracker.report(&system);
     failures.iter().map(|f| f.split(':').next().unwrap_or_default().to_string()).collect()
 }
 
@@ -95,17 +95,17 @@ fn each_failure_has_its_name() {
 
 #[test]
 fn values_out_of_range_are_refused() {
-    let (mut loaded, system) = scene();
-    let criterion = loaded.scene.criterion.insertion.as_mut().unwrap();
+    let (loaded, system) = scene();
+    let mut criterion = loaded.scene.criterion.get::<InsertionCriterion>().unwrap();
     criterion.check_every = 0.0;
-    let error = InsertionTracker::new(criterion, &system).unwrap_err();
+    let error = InsertionTracker::new(&criterion, &system).unwrap_err();
     assert!(error.contains("check_every is 0; expected a positive number"), "{error}");
     criterion.check_every = 0.1;
     criterion.into = "peg".into();
-    assert!(InsertionTracker::new(criterion, &system).unwrap_err().contains("into itself"));
+    assert!(InsertionTracker::new(&criterion, &system).unwrap_err().contains("into itself"));
     criterion.into = "table".into();
-    assert!(InsertionTracker::new(criterion, &system).unwrap_err().contains("the bodies are hole, peg"));
+    assert!(InsertionTracker::new(&criterion, &system).unwrap_err().contains("the bodies are hole, peg"));
     criterion.into = "peg".into();
     criterion.body = "hole".into();
-    assert!(InsertionTracker::new(criterion, &system).unwrap_err().contains("is fixed"));
+    assert!(InsertionTracker::new(&criterion, &system).unwrap_err().contains("is fixed"));
 }

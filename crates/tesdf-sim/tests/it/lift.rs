@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
-use tesdf_sim::criterion::{LiftReport, LiftTracker};
+use tesdf_sim::criterion::{LiftCriterion, LiftReport, LiftTracker, Tracker};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{RunRecord, State, Summary, System};
 
@@ -37,7 +37,7 @@ fn the_gripper_lifts_the_peg_and_holds_it() {
             loaded.scene.duration = duration;
         });
         assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
-        let lift = summary.lift.as_ref().unwrap();
+        let lift = summary.report::<LiftReport>().unwrap();
         // The criterion asks for 0.01 mm/s.
         assert!(lift.creep < 1e-8 && lift.penetration < 1e-7 && lift.measurements >= 11, "{lift:?}");
         // The work of the lift: 2 × 27 g of fingers and 63 g of peg. Nothing moves at the end.
@@ -51,16 +51,16 @@ fn the_gripper_lifts_the_peg_and_holds_it() {
 fn without_contacts_or_friction_the_criterion_fails() {
     let (_, off) = run(|loaded, _| loaded.scene.detector.mode = DetectorMode::Off);
     assert_eq!(off.passed, Some(false));
-    let lift = off.lift.unwrap();
+    let lift = off.report::<LiftReport>().unwrap();
     assert!(lift.rise < -1.0, "{lift:?}");
-    assert_eq!(names(&lift), ["lift", "creep", "jitter"]);
+    assert_eq!(names(lift), ["lift", "creep", "jitter"]);
 
     let (_, slippery) = run(|_, system| system.set_friction(PEG, 0.0).unwrap());
     assert_eq!(slippery.passed, Some(false));
-    let lift = slippery.lift.unwrap();
+    let lift = slippery.report::<LiftReport>().unwrap();
     assert!(lift.rise.abs() < 1e-5, "{lift:?}");
     // The peg glides away between the fingers and the floor, so it is also said to creep.
-    assert_eq!(names(&lift)[0], "lift");
+    assert_eq!(names(lift)[0], "lift");
 }
 
 /// Two pads that push by 20 N each hold up to 2 μ 20 N = 12 N. On its way the peg accelerates by up
@@ -95,7 +95,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 /// The report of a run whose bodies have these states after each step of 0.1 s.
 fn report(state: impl Fn(&mut Vec<State>, f64)) -> LiftReport {
     let (loaded, mut system) = scene();
-    let criterion = loaded.scene.criterion.lift.as_ref().unwrap();
+    let criterion = &loaded.scene.criterion.get::<LiftCriterion>().unwrap();
     system.set_state(PEG, State::at_rest(Pose::IDENTITY)).unwrap();
     let mut tracker = LiftTracker::new(criterion, &system).unwrap();
     let start = system.states().to_vec();
@@ -135,7 +135,8 @@ fn each_failure_has_its_name() {
     assert_eq!(names(&thrown), ["energy gain"]);
 
     let (loaded, system) = scene();
-    let mut tracker = LiftTracker::new(loaded.scene.criterion.lift.as_ref().unwrap(), &system).unwrap();
+    let mut tracker =
+        LiftTracker::new(&loaded.scene.criterion.get::<LiftCriterion>().unwrap(), &system).unwrap();
     tracker.observe(&system, 0.05);
     let short = tracker.report(&system);
     assert_eq!(names(&short), ["penetration", "lift"]);

@@ -9,7 +9,7 @@ use tesdf::collide::{CollideOptions, ContactsPer, Instance, Pose, Shape, ShapeId
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
-use tesdf_sim::criterion::{RestCriterion, RestReport, RestTracker};
+use tesdf_sim::criterion::{RestCriterion, RestReport, RestTracker, Tracker};
 use tesdf_sim::newton::{Newton, NewtonOptions};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Dynamics, Mass, MassProperties, Summary, System, simulate};
@@ -94,7 +94,7 @@ impl Bodies {
             assert!(engine.step(5e-3).unwrap().converged);
             tracker.observe(engine.system(), 5e-3);
         }
-        tracker.report()
+        tracker.report(engine.system())
     }
 }
 
@@ -203,17 +203,19 @@ fn scene(name: &str, change: impl FnOnce(&mut LoadedScene)) -> Summary {
 fn the_stack_meets_its_criterion_only_with_contacts() {
     let summary = scene("stack.toml", |_| {});
     assert_eq!(summary.passed, Some(true), "{summary:?}");
-    let rest = summary.rest.unwrap();
+    let rest = summary.report::<RestReport>().unwrap();
     assert!(rest.drift > 0.0 && rest.drift < 1e-9, "{rest:?}");
 
     let summary = scene("stack.toml", |loaded| loaded.scene.detector.mode = DetectorMode::Off);
     assert_eq!(summary.passed, Some(false));
-    let rest = summary.rest.unwrap();
+    let rest = summary.report::<RestReport>().unwrap();
     assert!(rest.drift > 0.04 && rest.failures[0].contains("drifts by"), "{rest:?}");
 
     // A run that ends before the bodies have settled shows nothing.
-    let summary = scene("stack.toml", |loaded| loaded.scene.criterion.rest.as_mut().unwrap().after = 1.0);
-    assert!(summary.rest.unwrap().failures[0].contains("no step after 1 s"));
+    let summary = scene("stack.toml", |loaded| {
+        loaded.scene.criterion.edit(|c: &mut RestCriterion| c.after = 1.0).unwrap();
+    });
+    assert!(summary.report::<RestReport>().unwrap().failures[0].contains("no step after 1 s"));
 }
 
 /// Bricks in running bond, each on two others, for a second. `tesdf simulate
@@ -223,11 +225,11 @@ fn the_stack_meets_its_criterion_only_with_contacts() {
 fn the_wall_meets_its_criterion_only_with_contacts() {
     let summary = scene("brick-wall.toml", |loaded| loaded.scene.duration = 1.0);
     assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
-    let rest = summary.rest.unwrap();
+    let rest = summary.report::<RestReport>().unwrap();
     // A constant force moves a body by the square of the time.
     assert!(rest.drift < DRIFT * 0.01 && rest.energy_gain < ROUNDING, "{rest:?}");
 
     let summary = scene("brick-wall.toml", |loaded| loaded.scene.detector.mode = DetectorMode::Off);
-    let rest = summary.rest.unwrap();
+    let rest = summary.report::<RestReport>().unwrap();
     assert!(rest.drift > 0.04 && rest.failures[0].contains("drifts by"), "{rest:?}");
 }

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
+use tesdf_sim::criterion::{ScrewCriterion, ScrewReport};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Moment, StepReport, Summary, System, simulate};
 
@@ -16,8 +17,8 @@ fn scene() -> (LoadedScene, System) {
                 bolt.mesh = Some("../data/procedural/iso_m16_bolt_6k.obj".into());
                 loaded.scene.duration = 0.06;
                 // An ideal screw makes 0.0083 turns in 60 ms.
-                loaded.scene.criterion.screw.as_mut().unwrap().min_turns = 0.003;
-                loaded.scene.criterion.screw.as_mut().unwrap().min_acceleration = 0.0;
+                loaded.scene.criterion.edit(|c: &mut ScrewCriterion| c.min_turns = 0.003).unwrap();
+                loaded.scene.criterion.edit(|c: &mut ScrewCriterion| c.min_acceleration = 0.0).unwrap();
             })
         })
         .clone()
@@ -62,7 +63,7 @@ fn the_nut_is_not_followed() {
 fn without_contacts_the_criterion_fails() {
     let summary = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
     assert_eq!(summary.passed, Some(false));
-    let screw = summary.screw.unwrap();
+    let screw = summary.report::<ScrewReport>().unwrap();
     assert!(screw.turns.abs() < 1e-9 && screw.travel > 0.01, "{screw:?}");
     assert!(screw.failures.iter().any(|f| f.contains("turns; expected at least")), "{screw:?}");
     assert!(screw.failures.iter().any(|f| f.contains("differ by")), "{screw:?}");

@@ -1,6 +1,7 @@
 //! Bodies that begin deep in each other come apart, also those that are past each other's middle.
 
 use tesdf::glam::{DQuat, DVec3};
+use tesdf_sim::criterion::{SeparationCriterion, SeparationReport};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Mass, RunRecord, Summary, System};
 
@@ -21,7 +22,7 @@ fn crossing(offset: f64) -> LoadedScene {
         let body = body.as_mut();
         (body.translation, body.rotation) = (translation, rotation);
     }
-    loaded.scene.criterion.separation.as_mut().unwrap().limits = vec![[0.06, 1e-5]];
+    loaded.scene.criterion.edit(|c: &mut SeparationCriterion| c.limits = vec![[0.06, 1e-5]]).unwrap();
     loaded
 }
 
@@ -36,7 +37,7 @@ fn shafts_that_cross_come_apart() {
         for offset in [0.0, 1e-6, 3e-3, 1.2e-2] {
             let mut loaded = crossing(offset);
             loaded.scene.detector.mode = mode;
-            let found = run(&loaded).separation.unwrap();
+            let found = run(&loaded).report::<SeparationReport>().unwrap().clone();
             assert!(found.penetration[0] > 5e-3, "{offset}: {found:?}");
             assert_eq!(found.failures, [""; 0], "{mode:?}, {offset}: {found:?}");
         }
@@ -48,7 +49,7 @@ fn a_small_pile_comes_apart_the_same_on_any_number_of_threads() {
     let loaded = pile(24);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| run(&loaded)).separation.unwrap()
+        pool.install(|| run(&loaded)).report::<SeparationReport>().unwrap().clone()
     };
     let one = on(1);
     assert_eq!(one.failures, [""; 0], "{one:?}");
@@ -62,7 +63,7 @@ fn without_contacts_the_criterion_fails() {
     loaded.scene.detector.mode = DetectorMode::Off;
     let summary = run(&loaded);
     assert_eq!(summary.passed, Some(false));
-    let failures = summary.separation.unwrap().failures;
+    let failures = summary.report::<SeparationReport>().unwrap().failures.clone();
     assert_eq!(failures.len(), 1, "{failures:?}");
     assert!(failures[0].starts_with("penetration: ") && failures[0].ends_with("from 0.06 s on"));
 }
@@ -71,7 +72,7 @@ fn without_contacts_the_criterion_fails() {
 fn a_kick_is_named() {
     let mut loaded = crossing(0.0);
     loaded.scene.bodies[1].as_mut().velocity = [1.0, 0.0, 0.0];
-    let failures = run(&loaded).separation.unwrap().failures;
+    let failures = run(&loaded).report::<SeparationReport>().unwrap().clone().failures;
     assert!(failures.iter().any(|failure| failure.starts_with("kick: ")), "{failures:?}");
 }
 
@@ -79,7 +80,7 @@ fn a_kick_is_named() {
 fn limits_that_say_nothing_are_refused() {
     let message = |limits: Vec<[f64; 2]>| {
         let mut loaded = crossing(0.0);
-        loaded.scene.criterion.separation.as_mut().unwrap().limits = limits;
+        loaded.scene.criterion.edit(|c: &mut SeparationCriterion| c.limits = limits).unwrap();
         loaded.system().unwrap_err().to_string()
     };
     assert!(message(Vec::new()).contains("limits is empty"));
@@ -143,7 +144,7 @@ fn a_small_pile_has_no_energy_but_that_of_gravity() {
         let mut loaded = small_pile();
         loaded.scene.detector.mode = mode;
         let (record, summary) = crate::support::run(&loaded, loaded.system().unwrap());
-        let found = summary.separation.unwrap();
+        let found = summary.report::<SeparationReport>().unwrap();
         let [gain, most] = gain(&record, &mut loaded.system().unwrap());
         assert!(found.penetration[0] > 2e-3 && most > 0.01, "{mode:?}: {most} J, {found:?}");
         // Springs of contacts give back up to 0.3 % of the energy. With a push of deep bodies that

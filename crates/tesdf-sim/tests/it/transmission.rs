@@ -1,5 +1,6 @@
 //! A gearbox turns its output shaft by contact alone.
 
+use tesdf_sim::criterion::{TransmissionCriterion, TransmissionReport};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{RunRecord, Summary};
 
@@ -64,14 +65,16 @@ fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
 /// Only the first second, in which the first gear engages and drives.
 fn shorten(loaded: &mut LoadedScene) {
     loaded.scene.duration = 1.0;
-    let criterion = loaded.scene.criterion.transmission.as_mut().expect("the criterion");
-    criterion.gears.truncate(1);
-    criterion.gears[0].to = 1.0;
-    criterion.neutral.truncate(1);
+    let first = |criterion: &mut TransmissionCriterion| {
+        criterion.gears.truncate(1);
+        criterion.gears[0].to = 1.0;
+        criterion.neutral.truncate(1);
+    };
+    loaded.scene.criterion.edit(first).expect("the criterion");
 }
 
 fn failures(summary: &Summary) -> String {
-    summary.transmission.as_ref().unwrap().failures.join("\n")
+    summary.report::<TransmissionReport>().unwrap().failures.join("\n")
 }
 
 #[test]

@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tesdf_sim::criterion::{SeparationCriterion, SeparationReport, SeparationTracker};
+use tesdf_sim::criterion::{SeparationCriterion, SeparationReport, SeparationTracker, Tracker};
 use tesdf_sim::scene_file::DetectorMode;
 use tesdf_sim::{HiddenPair, RunRecord, Summary};
 
@@ -128,7 +128,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let inputs = pile.loaded.geometry_files();
     let sink = Sink::open(&pile_args.output, "fig8", &inputs)?;
     let picture = open_in_folder(&pile_args.output, "fig8.svg", &inputs)?;
-    let criterion = pile.loaded.scene.criterion.separation.clone();
+    let criterion = pile.loaded.scene.criterion.get::<SeparationCriterion>();
     let criterion = criterion.filter(|of| !of.limits.is_empty()).ok_or_else(|| {
         Failure::new(format!("{}: it has no criterion.separation", pile.loaded.path.display()))
     })?;
@@ -184,7 +184,7 @@ fn measure(
         tracker.observe(&system, pile.loaded.scene.time_step);
         bar.set(step as f64 / steps as f64);
     }
-    Ok(tracker.report())
+    Ok(tracker.report(&system))
 }
 
 fn save(record: &RunRecord, folder: &std::path::Path, row: &Row, args: &PileArgs) -> Result<(), Failure> {

@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use tesdf::TeSdf;
 use tesdf::collide::{Instance, Shape, ShapeId};
+use tesdf_sim::criterion::SeparationCriterion;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{PartialRun, RunRecord, Summary, System, simulate_from};
 
@@ -87,7 +88,7 @@ impl Pile {
         let mut loaded = self.loaded.clone();
         loaded.scene.detector.mode = mode;
         let run = PartialRun::new(&loaded.scene, &system, self.folder.clone());
-        loaded.scene.criterion.separation = None;
+        loaded.scene.criterion.remove::<SeparationCriterion>();
         let mut engine = loaded.newton_with(system, detector).map_err(Failure::new)?;
         simulate_from(&loaded.scene, &mut engine, run, |moment| {
             bar.set(moment.step as f64 / moment.steps as f64);
@@ -102,9 +103,8 @@ fn shorten(loaded: &mut LoadedScene) {
     let (_, frames) = QUICK;
     let scene = &mut loaded.scene;
     scene.duration = f64::from(frames) * scene.time_step;
-    if let Some(separation) = &mut scene.criterion.separation {
-        separation.limits.retain(|[time, _]| *time <= scene.duration);
-    }
+    let duration = scene.duration;
+    scene.criterion.edit(|of: &mut SeparationCriterion| of.limits.retain(|[time, _]| *time <= duration));
 }
 
 /// Keeps the shafts that are nearest to the middle, which overlap as deeply as all of them.

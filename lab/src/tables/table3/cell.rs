@@ -5,7 +5,7 @@ use std::time::Instant;
 use serde::Serialize;
 use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, clearance};
-use tesdf_sim::criterion::ScrewReport;
+use tesdf_sim::criterion::{InsertionCriterion, InsertionReport, ScrewCriterion, ScrewReport};
 use tesdf_sim::newton::Detect;
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{Moment, Summary, System, simulate};
@@ -84,7 +84,7 @@ impl Setup {
         let mut unmeasured: Option<CollideError> = None;
         let mut engine = loaded.newton_with(system, detector).map_err(Failure::new)?;
         // The insertion criterion measures the clearance itself.
-        let is_measured = loaded.scene.criterion.insertion.is_none();
+        let is_measured = loaded.scene.criterion.get::<InsertionCriterion>().is_none();
         let run = simulate(&loaded.scene, &mut engine, |moment: &Moment<'_>| {
             progress(moment.step as f64 / moment.steps as f64);
             steps = moment.step;
@@ -117,8 +117,9 @@ impl Setup {
         let mut reasons: Vec<&'static str> = failures.iter().map(|(name, _)| *name).collect();
         reasons.sort_unstable();
         reasons.dedup();
-        let travel = summary.screw.as_ref().map(|s| s.travel);
-        let travel = travel.or(summary.insertion.as_ref().map(|i| i.travel)).unwrap_or(f64::NAN);
+        let insertion = summary.report::<InsertionReport>();
+        let travel = summary.report::<ScrewReport>().map(|s| s.travel);
+        let travel = travel.or(insertion.map(|i| i.travel)).unwrap_or(f64::NAN);
         Ok(Cell {
             scenario: self.scenario.name(),
             tolerance_um: self.tolerance,
@@ -128,7 +129,7 @@ impl Setup {
             success: failures.is_empty(),
             reasons,
             failures: failures.into_iter().map(|(name, text)| format!("{name}: {text}")).collect(),
-            penetration_um: summary.insertion.as_ref().map_or(depth, |i| i.penetration) * 1e6,
+            penetration_um: insertion.map_or(depth, |i| i.penetration) * 1e6,
             travel_mm: travel * 1e3,
             contacts: summary.mean_contacts,
             steps,
@@ -141,8 +142,8 @@ impl Setup {
 /// The failures of the scene's criterion, with their names.
 fn of_criterion(summary: &Summary, loaded: &LoadedScene) -> Vec<(&'static str, String)> {
     let mut failures = Vec::new();
-    let criterion = loaded.scene.criterion.screw.as_ref();
-    if let (Some(screw), Some(criterion)) = (&summary.screw, criterion) {
+    let criterion = loaded.scene.criterion.get::<ScrewCriterion>();
+    if let (Some(screw), Some(criterion)) = (summary.report::<ScrewReport>(), criterion) {
         let ScrewReport { turns, largest_pitch_error: error, .. } = *screw;
         let share = screw.acceleration / screw.analytic_acceleration;
         let mut demand = |met: bool, name: &'static str, text: String| {
@@ -177,7 +178,7 @@ fn of_criterion(summary: &Summary, loaded: &LoadedScene) -> Vec<(&'static str, S
             format!("{:.4} of the released energy is kinetic", screw.energy),
         );
     }
-    if let Some(insertion) = &summary.insertion {
+    if let Some(insertion) = summary.report::<InsertionReport>() {
         for failure in &insertion.failures {
             // The messages of hidden overlaps have no name.
             let named = failure.split_once(": ").and_then(|(name, text)| {

@@ -1,4 +1,5 @@
 //! The two scenes of Table III, at each tolerance.
+use tesdf_sim::criterion::{InsertionCriterion, ScrewCriterion};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 
 use super::assets::Assets;
@@ -108,7 +109,8 @@ impl Scenario {
         scene.record.contacts_every = 0;
         match self {
             Self::BoltNut => {
-                let screw = scene.criterion.screw.as_mut().ok_or_else(|| missing("criterion.screw"))?;
+                let screw = scene.criterion.get::<ScrewCriterion>();
+                let mut screw = screw.ok_or_else(|| missing("criterion.screw"))?;
                 // The play along the axis is 1.155 times the tolerance, which is radial.
                 screw.backlash = 1.16 * clearance;
                 screw.min_acceleration = if args.quick { 0.0 } else { MIN_ACCELERATION };
@@ -117,15 +119,17 @@ impl Scenario {
                     screw.min_turns *= (QUICK / scene.duration).powi(2);
                     scene.duration = QUICK;
                 }
+                scene.criterion.set(&screw);
             }
             Self::PegInHole => {
-                let criterion = scene.criterion.insertion.as_mut();
-                let insertion = criterion.ok_or_else(|| missing("criterion.insertion"))?;
+                let insertion = scene.criterion.get::<InsertionCriterion>();
+                let mut insertion = insertion.ok_or_else(|| missing("criterion.insertion"))?;
                 let ratio = clearance / insertion.clearance;
                 insertion.clearance = clearance;
                 insertion.depth_tolerance *= ratio;
                 insertion.max_tilt *= ratio;
                 insertion.max_offset *= ratio;
+                scene.criterion.set(&insertion);
             }
         }
         Ok(loaded)
