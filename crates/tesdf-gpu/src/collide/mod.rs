@@ -33,7 +33,7 @@ use on_processor::{Divided, with_pairs};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
-use pass::{Parts, parts};
+use pass::{Normals, Parts, parts};
 use scene::instances::Instances;
 use scene::placed::{FieldFrame, Placed};
 use scene::{GpuShapeId, GpuShapes};
@@ -237,7 +237,7 @@ impl Detector {
         options: &CollideOptions,
         timing: Timing,
     ) -> Result<Contacts, GpuError> {
-        let (instances, _) = self.passes(scene, None, options, timing)?;
+        let (instances, _) = self.passes(scene, None, options, Normals::Gradients, timing)?;
         self.contacts(scene, &instances, options)
     }
 
@@ -248,6 +248,7 @@ impl Detector {
         scene: &Scene,
         given: Option<&GivenPoses<'_>>,
         options: &CollideOptions,
+        normals: Normals,
         timing: Timing,
     ) -> Result<(Instances, Buffer), GpuError> {
         if shape_ids(scene) != self.shape_ids {
@@ -272,7 +273,7 @@ impl Detector {
             if matches!(options.reduction, Reduction::PerPair(_)) {
                 self.buffers.add_members(&self.device)?;
             }
-            let (counts, placed) = self.pass(&instances, given, options, timing)?;
+            let (counts, placed) = self.pass(&instances, given, options, normals, timing)?;
             if !self.grow(&counts)? {
                 self.report.counts = counts;
                 return Ok((instances, placed));
@@ -308,12 +309,12 @@ impl Detector {
         Ok(true)
     }
 
-    /// The tolerance for each instance, in the frame of its field. It is at least [`FINEST`].
-    fn tolerances(&self, instances: &Instances, tolerance: Length) -> Vec<f32> {
+    /// The tolerance for each instance, in the frame of its field. It is at least `least`.
+    fn tolerances(&self, instances: &Instances, tolerance: Length, least: f64) -> Vec<f32> {
         let in_field = |(at, &shape): (&Placed, &usize)| {
             let scale = at.unit / self.frames[shape].unit();
             let diagonal = self.diagonals[shape].min(f64::MAX) * scale;
-            (tolerance.resolve(diagonal) / at.unit).max(FINEST) as f32
+            (tolerance.resolve(diagonal) / at.unit).max(least) as f32
         };
         instances.placed.iter().zip(&instances.shapes).map(in_field).collect()
     }

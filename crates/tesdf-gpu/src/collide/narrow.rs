@@ -3,14 +3,14 @@ use tesdf::collide::Mode;
 
 use super::pass::{GROUP, Parts, Pass, parts};
 use super::stages::launch;
-use super::{Counting, Exchange, Lanes};
+use super::{Counting, Exchange, FINEST, Lanes};
 use crate::GpuError;
 use crate::device::Buffer;
-use crate::kernels::counters::POLYGONS;
+use crate::kernels::counters::{CONTACTS, POLYGONS};
 use crate::kernels::narrow::exact::AskedExactLaunch;
 use crate::kernels::narrow::exchange::{LANES, Variant};
 use crate::kernels::narrow::faces::AskedLaunch;
-use crate::kernels::narrow::{exact, exact_faces, faces, nodes, whole_faces};
+use crate::kernels::narrow::{cones, exact, exact_faces, faces, nodes, whole_faces};
 
 impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
@@ -19,6 +19,21 @@ impl Pass<'_> {
             Mode::Face => self.narrow_faces(),
             Mode::Exact => self.narrow_exact(),
         }
+    }
+
+    /// Gives contacts of faces the normals that both bodies allow.
+    pub(super) fn in_cones(&mut self) -> Result<(), GpuError> {
+        let per_contact = self.groups_for(self.detector.buffers.room.contacts, GROUP, CONTACTS)?;
+        let tolerances = self.tolerances(0.0)?;
+        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+        let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
+        launch!(
+            self.stages,
+            "normals",
+            per_contact,
+            GROUP,
+            cones::in_cones(shapes.argument(), pairs, tolerances.words(), counters, contacts)
+        )
     }
 
     fn narrow_nodes(&mut self) -> Result<(), GpuError> {
@@ -40,9 +55,9 @@ impl Pass<'_> {
         self.options.cos_theta.map_or(-2.0, |cos| cos as f32)
     }
 
-    /// The tolerances of all instances on the device.
-    fn tolerances(&mut self) -> Result<Buffer, GpuError> {
-        let tolerances = self.detector.tolerances(self.instances, self.options.tolerance);
+    /// The tolerances of all instances on the device, at least `least`.
+    fn tolerances(&mut self, least: f64) -> Result<Buffer, GpuError> {
+        let tolerances = self.detector.tolerances(self.instances, self.options.tolerance, least);
         let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
         self.sent += tolerances.bytes();
         Ok(tolerances)
@@ -62,7 +77,7 @@ impl Pass<'_> {
             whole,
         };
         let per_polygon = self.groups_for(buffers.room.polygons, per, POLYGONS)?;
-        let tolerances = self.tolerances()?;
+        let tolerances = self.tolerances(FINEST)?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
         let asked = AskedLaunch::new(tolerances.words(), self.options.iterations, self.cos_theta());
         if whole {
@@ -96,7 +111,7 @@ impl Pass<'_> {
     fn narrow_exact(&mut self) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let per_polygon = self.groups_for(buffers.room.polygons, 1, POLYGONS)?;
-        let tolerances = self.tolerances()?;
+        let tolerances = self.tolerances(FINEST)?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
         let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
         let counting = self.detector.options.counting == Counting::Operations;

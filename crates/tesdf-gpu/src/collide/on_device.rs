@@ -9,7 +9,7 @@ use tesdf::collide::{
 
 use super::contacts::contacts;
 use super::on_processor::{has_undetected, with_pairs_on_device};
-use super::pass::{GROUP, Parts, Pass, parts};
+use super::pass::{GROUP, Normals, Parts, Pass, parts};
 use super::scene::instances::Instances;
 use super::scene::placed::Placed;
 use super::stages::{Stages, Timing, launch};
@@ -45,9 +45,10 @@ pub struct DeviceContacts {
     pub points_a: DeviceArray<f32>,
     /// `[N, 3]`: the points of the second instance's surface that are closest to these.
     pub points_b: DeviceArray<f32>,
-    /// `[N, 3]`: unit gradients of the signed distance of the second instance; from the second to
-    /// the first. [`detect`](Detector::detect) instead gives contacts of faces normals that both
-    /// bodies allow.
+    /// `[N, 3]`: unit normals, from the second instance to the first: those that
+    /// [`detect`](Detector::detect) gives. A contact of faces has one that both bodies allow; the
+    /// others, and those of bodies whose vertices have moved, have the gradient of the signed
+    /// distance of the second instance.
     pub normals: DeviceArray<f32>,
     /// `[N]`: signed distances.
     pub distances: DeviceArray<f32>,
@@ -272,7 +273,8 @@ impl Detector {
         given: Option<&GivenPoses<'_>>,
         options: &CollideOptions,
     ) -> Result<DeviceContacts, GpuError> {
-        let (instances, placed) = self.passes(scene, given, options, Timing::Off)?;
+        let normals = if self.has_cones(options) { Normals::InCones } else { Normals::Gradients };
+        let (instances, placed) = self.passes(scene, given, options, normals, Timing::Off)?;
         let found = self.in_world(&instances, &placed, options)?;
         let hidden = self.overlaps(&instances)?;
         if hidden.is_empty() {

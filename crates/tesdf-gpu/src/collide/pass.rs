@@ -37,6 +37,15 @@ pub fn parts(options: &CollideOptions) -> Parts {
     }
 }
 
+/// The normals of the contacts that a pass finds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Normals {
+    /// Gradients of the signed distance, from which the processor finds the others.
+    Gradients,
+    /// Of contacts of faces, those that both bodies allow.
+    InCones,
+}
+
 /// The data that all launches of a pass share.
 pub struct Pass<'a> {
     pub detector: &'a Detector,
@@ -58,6 +67,7 @@ impl Detector {
         instances: &Instances,
         given: Option<&GivenPoses<'_>>,
         options: &CollideOptions,
+        normals: Normals,
         timing: Timing,
     ) -> Result<(Counts, Buffer), GpuError> {
         let device = self.device.clone();
@@ -87,6 +97,9 @@ impl Detector {
             pass.groups_in_slabs(pass.detector.buffers.room.meshlets, 1, slabs, counters::MESHLETS)?;
         pass.middle(&per_meshlet)?;
         pass.narrow()?;
+        if normals == Normals::InCones {
+            pass.in_cones()?;
+        }
         pass.reduce()?;
         let Pass { sent, stages: Stages { launches, times, .. }, .. } = pass;
         self.report.sent += sent;
@@ -112,8 +125,8 @@ impl Detector {
                 doing: "detecting contacts",
                 reason: format!(
                     "the driver broke off the loops of {} threads, as Mesa's llvmpipe does after 65,535 iterations: a \
-                     face meets too many cells, or a pair has too many contacts to reduce. Detect on the processor or \
-                     on a GPU",
+                     face meets too many cells, a contact is at too many faces, or a pair has too many contacts to \
+                     reduce. Detect on the processor or on a GPU",
                     counts.broken_off
                 ),
             });

@@ -22,7 +22,7 @@ fn solid(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> SolidMesh {
     SolidMesh::new(TriangleMesh::new(vertices, faces).expect("valid ids")).expect("a solid")
 }
 
-fn encoded(solid: &SolidMesh) -> TeSdf {
+pub fn encoded(solid: &SolidMesh) -> TeSdf {
     Encoder::new().preset(Preset::Fast).encode(solid).expect("encodes")
 }
 
@@ -78,7 +78,7 @@ fn shrunk(seed: u64) -> SolidMesh {
     SolidMesh::new(TriangleMesh::new(vertices, faces).expect("valid ids")).unwrap_or(member)
 }
 
-fn solids() -> Vec<(String, SolidMesh)> {
+pub fn solids() -> Vec<(String, SolidMesh)> {
     let far = DVec3::splat(-3.0);
     let mut all = vec![
         ("a face of one vertex".to_owned(), cube_and(&[], &[[1, 1, 1], [6, 6, 6]])),

@@ -1,7 +1,6 @@
 //! One small test for each stage and mode, for a device whose compiler is slow: the checks of each
 //! change run these on the software Vulkan driver, and those before a release run all tests on it.
 use crate::compare::{Compared, device, each_mode, hold};
-use crate::on_device::Normals;
 use crate::support::bodies::{Placed, Relation, body, scene};
 use crate::support::random::Random;
 use crate::support::tetrahedra::{bare_beam, bend, moves};
@@ -61,13 +60,7 @@ fn contacts_that_stay_on_the_device() {
     let options = CollideOptions { contact_distance: 0.01, ..CollideOptions::with_mode(Mode::Node) };
     let expected = detector.detect(&scene, &options).expect("detects");
     let found = detector.detect_on_device(&scene, None, &options).expect("detects");
-    on_device::are_equal(
-        &on_device::read(detector.device(), &found),
-        expected.as_slice(),
-        2.0,
-        1e-6,
-        Normals::Same,
-    );
+    on_device::are_equal(&on_device::read(detector.device(), &found), expected.as_slice(), 2.0, 1e-6);
 }
 
 #[test]

@@ -223,5 +223,8 @@ impl PartialEq for CriterionReport {
 
 /// Writes reports as fields with the names of their criteria.
 pub(crate) fn by_name<S: Serializer>(reports: &[CriterionReport], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(reports.iter().map(|report| (report.name, &report.values)))
+    let of_scene = reports.iter().map(|report| (report.name, Some(&report.values)));
+    let is_there = |kind: &Kind| reports.iter().any(|report| report.name == kind.name);
+    let others = known().into_iter().filter(|kind| !is_there(kind)).map(|kind| (kind.name, None));
+    serializer.collect_map(of_scene.chain(others))
 }

@@ -5,7 +5,7 @@ use super::TeSdf;
 
 /// A corner of a face may be higher over the plane of a face beside it by this part of its distance,
 /// and the place is convex all the same.
-pub(crate) const CONVEX: f64 = 1e-5;
+pub const CONVEX: f64 = 1e-5;
 
 /// Cosine of the least angle of a face at a vertex whose surroundings are clear (0.01 rad).
 const LEAST_ANGLE: f64 = 0.99995;
@@ -14,7 +14,8 @@ impl TeSdf {
     /// For each vertex, the distance from it within which there are only the faces that have it, in
     /// the unit of the mesh: positive where these are convex, negative where they are not, and 0
     /// where a face has no area or is a needle there. Made on first use.
-    pub(crate) fn corner_cones(&self) -> &[f32] {
+    #[doc(hidden)]
+    pub fn corner_cones(&self) -> &[f32] {
         // On one thread: a thread that waits could take up a task that waits for this.
         self.corner_cones
             .get_or_init(|| (0..self.vertices.len() as u32).map(|vertex| self.corner_cone(vertex)).collect())

@@ -343,7 +343,8 @@ impl TeSdf {
 
     /// The faces that have a vertex, by their places in the file, in ascending order.
     #[cfg(feature = "collide")]
-    pub(crate) fn faces_at(&self, vertex: u32) -> &[u32] {
+    #[doc(hidden)]
+    pub fn faces_at(&self, vertex: u32) -> &[u32] {
         self.faces_at.get_or_init(|| FacesAt::new(&self.faces, self.vertices.len())).of(vertex)
     }
 

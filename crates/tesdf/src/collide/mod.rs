@@ -45,7 +45,7 @@ mod time_of_impact;
 pub mod internal {
     pub use super::bodies::field::ROUNDING;
     pub use super::bodies::polygon::{MAX_VERTICES, Parts, Polygon};
-    pub use super::cones::in_cones;
+    pub use super::cones::{in_cones, limits};
     pub use super::detect::candidate_contacts::kept_at_vertices;
     pub use super::detect::candidates::{count_faces, count_polygons};
     pub use super::detect::hidden::{DEEPER, SETTLED, THICK};

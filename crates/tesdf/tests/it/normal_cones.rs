@@ -7,16 +7,10 @@ use tesdf::collide::{
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 
-use crate::support::blocks::{self, Block, Kind};
+use crate::support::blocks::{self, Block, Kind, Known, ON_SIDE, SLOPE, touching};
 use crate::support::bodies::rotation;
 use crate::support::random::Random;
 use crate::support::shapes;
-
-/// Sine of the angle by which a normal may be out of a cone (`docs/math.md`, section 18).
-const SLOPE: f64 = 0.1;
-
-/// A point is on a side of a box of size 1 when it is nearer.
-const ON_SIDE: f64 = 5e-6;
 
 /// Bodies of size 1 are apart where their distance is greater.
 const APART: f64 = 1e-5;
@@ -37,38 +31,6 @@ fn contacts_per(blocks: &[Block; 2], mode: Mode, contacts_per: ContactsPer) -> V
 
 fn contacts(blocks: &[Block; 2], mode: Mode) -> Vec<Contact> {
     contacts_per(blocks, mode, ContactsPer::Minimum)
-}
-
-/// Two boxes of size 1 that nearly touch at random features: `gap` is the distance along the
-/// direction that turns a feature of the second to the first.
-fn touching(random: &mut Random, gap: f64) -> [Block; 2] {
-    let mut block = |turned: bool| {
-        let kind = if random.unit() < 0.5 { Kind::Mesh } else { Kind::Formula };
-        let half = DVec3::new(random.between(0.2, 0.4), random.between(0.2, 0.4), random.between(0.2, 0.4));
-        let rotation = if turned { rotation(random) } else { DQuat::IDENTITY };
-        Block { kind, half, pose: Pose { translation: DVec3::ZERO, rotation } }
-    };
-    let flush = block(false);
-    let [first, mut second] = [block(true), block(true)];
-    let mut first = if random.unit() < 0.3 { Block { pose: flush.pose, ..first } } else { first };
-    if random.unit() < 0.3 {
-        // Flush faces and parallel edges.
-        second.pose.rotation = first.pose.rotation;
-    }
-    // The second is moved along a direction until the supports in it are `gap` apart.
-    let side = |block: &Block, axis: usize| block.pose.rotation * DVec3::AXES[axis];
-    let direction = match random.index(3) {
-        0 => side(&first, random.index(3)),
-        1 => side(&first, random.index(3)).cross(side(&second, random.index(3))),
-        _ => random.direction(),
-    };
-    let direction = direction.try_normalize().unwrap_or(DVec3::Z);
-    let support = |block: &Block, d: DVec3| (block.pose.rotation.inverse() * d).abs().dot(block.half);
-    let way = support(&first, direction) + support(&second, direction) + gap;
-    let aside = 0.2 * random.in_cube().reject_from_normalized(direction);
-    first.pose.translation = 0.1 * random.in_cube();
-    second.pose.translation = first.pose.translation + way * direction + aside;
-    [first, second]
 }
 
 #[test]
@@ -104,46 +66,25 @@ fn normals_are_in_the_cones_of_both_bodies() {
     assert!(seen > 1000, "{seen} contacts, at most {worst} out of a cone");
 }
 
-/// Contacts per face and per cell keep their points, which need not be the nearest places of two
-/// features. Where bodies touch there and have a direction in both cones, the normal is such a one.
 #[test]
 fn normals_per_face_and_cell_are_in_the_cones_where_these_meet() {
-    let mut random = Random(0xced);
-    let (mut seen, mut none) = (0, 0);
-    for round in 0..200 {
-        let blocks = touching(&mut random, [0.0, 1e-12, 1e-9, 1e-7, -1e-12, -1e-9][round % 6]);
-        for per in [ContactsPer::Face, ContactsPer::Cell] {
-            let found = contacts_per(&blocks, Mode::Exact, per).into_iter();
-            for c in found.filter(|c| c.converged && c.distance.abs() <= 1e-6) {
-                let [a, b] = if c.instance_a == InstanceId(0) { blocks } else { [blocks[1], blocks[0]] };
-                let near = ON_SIDE + 2.0 * c.distance.abs();
-                let out = |n: DVec3| {
-                    let of_a = a.out_of_cone(c.point_a, -n, near);
-                    // A face of b is a wall for all points of a.
-                    let of_a = if b.sides_at(c.point_b, near) == 1 { 0.0 } else { of_a };
-                    of_a.max(b.out_of_cone(c.point_b, n, near))
-                };
-                // The normals of faces and the common normals of edges.
-                let (of_a, of_b) = (a.axes(), b.axes());
-                let across = of_a.iter().flat_map(|p| of_b.map(|q| p.cross(q).normalize_or(*p)));
-                let directions = of_a.into_iter().chain(of_b).chain(across).flat_map(|n| [n, -n]);
-                // Up to the tolerance of faces that are parallel.
-                let is_allowed = directions.map(out).any(|out| out < 1e-4);
-                seen += usize::from(is_allowed);
-                none += usize::from(!is_allowed);
-                let own = out(c.normal);
-                assert!(!is_allowed || own <= 1.01 * SLOPE, "{own} out of a cone, {per:?}: {blocks:?} {c:?}");
-            }
-        }
-    }
-    assert!(seen > 1000, "{seen} contacts, and {none} without a common direction");
+    let detect =
+        |scene: &Scene, options: &CollideOptions| detect(scene, options).expect("contacts").into_vec();
+    blocks::normals_are_in_the_cones_where_these_meet(
+        &detect,
+        &[0.0, 1e-12, 1e-9, 1e-7, -1e-12, -1e-9],
+        ON_SIDE,
+    );
 }
 
 #[test]
 fn edges_are_pushed_along_the_normal_of_the_floor_in_each_mode() {
-    let detect = |scene: &Scene, options: &CollideOptions| detect(scene, options).expect("contacts");
+    let detect =
+        |scene: &Scene, options: &CollideOptions| detect(scene, options).expect("contacts").into_vec();
     // Of the diagonals: 1e-6 of the smaller one, and the tolerance of the larger one.
-    blocks::edges_are_pushed_along_the_normal_of_the_floor(&detect, [7.8e-7, 7.8e-7]);
+    let known = Known { near: 7.8e-7, tolerance: 7.8e-7, direction: 1e-9 };
+    let kinds = [ContactsPer::Cell, ContactsPer::Face, ContactsPer::Minimum];
+    blocks::edges_are_pushed_along_the_normal_of_the_floor(&detect, &kinds, known);
 }
 
 /// A contact of a face with an edge or a vertex has the normal of the face, whichever body has it,

@@ -1,5 +1,6 @@
 //! Packs shapes into the arrays that kernels read.
 use glam::{DVec3, Vec3};
+use tesdf::TeSdf;
 use tesdf::asset::FaceRecord;
 use tesdf::asset::layout::{SignHints, TreeChild};
 use tesdf::base::InsideRule;
@@ -44,7 +45,7 @@ impl Packed {
         };
         match shape {
             Shape::Mesh(asset) => {
-                return self.add_mesh(&asset.arrays(), asset.sign_arrays().as_ref());
+                return self.add_mesh(asset);
             }
             Shape::Plane => sizes(shapes::PLANE, DVec3::ZERO),
             Shape::Box { half_extents } => sizes(shapes::BOX, *half_extents),
@@ -53,6 +54,8 @@ impl Packed {
                 sizes(shapes::ROUND, DVec3::new(*half_height, *radius, 0.0));
             }
         }
+        row[shapes::DIAGONAL as usize] = bounded(shape.diagonal()).to_bits();
+        row[shapes::FANS as usize] = shapes::NONE;
         row[shapes::MESHLET_COUNT as usize] = 1;
         row[shapes::BAD_VERTEX as usize] = shapes::NONE;
         // A plane has two triangles, whose size depends on the field that they meet.
@@ -66,11 +69,8 @@ impl Packed {
         Ok(row)
     }
 
-    fn add_mesh(
-        &mut self,
-        mesh: &Arrays,
-        sign: Option<&SignArrays>,
-    ) -> Result<[u32; STRIDE as usize], String> {
+    fn add_mesh(&mut self, asset: &TeSdf) -> Result<[u32; STRIDE as usize], String> {
+        let (mesh, sign) = (&asset.arrays(), asset.sign_arrays());
         let depth = depth(mesh);
         // A walk of the tree replaces a node on its stack by the two children.
         if depth + 2 > TREE_DEPTH {
@@ -105,7 +105,9 @@ impl Packed {
         set(shapes::MESHLET_COUNT, meshlets.len() as u32);
         set(shapes::FACE_COUNT, mesh.faces.len() as u32);
         set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
-        if let Some(sign) = sign {
+        set(shapes::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
+        set(shapes::FANS, self.fans(asset)?);
+        if let Some(sign) = &sign {
             set(shapes::RULE, rule_of(sign));
             let triangles = [&sign.triangles[..], &sign.closing].concat();
             let record = |corners: &[DVec3; 3]| {
@@ -126,7 +128,6 @@ impl Packed {
         set(shapes::INNER_BALL, self.rows_at([inner_ball(mesh.inner_ball)].into_iter())?);
         set(shapes::BAD_VERTEX, shapes::NONE);
         if !roots.tree.is_empty() {
-            set(shapes::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
             set(shapes::TET_VERTICES, self.words_at(mesh.tetrahedra.as_flattened().iter().copied())?);
             set(shapes::FACE_LEVELS, self.words_at(face_levels(mesh.tree_children).into_iter())?);
             set(shapes::TREE_LEVELS, self.words_at(tree_levels(&roots.tree).into_iter())?);
@@ -138,6 +139,7 @@ impl Packed {
         set(shapes::BOUND_UNIT, mesh.cell_bound_unit);
         set(shapes::BAND, mesh.band);
         set(shapes::HALF_THICKNESS, mesh.half_thickness);
+        set(shapes::DIAGONAL, mesh.bounds.extent().length());
         let beyond = sign.map_or(0.0, |sign| sign.reach_beyond);
         set(shapes::REACH_BEYOND, beyond);
         let bounds = mesh.bounds.grown(mesh.half_thickness + beyond);
@@ -148,10 +150,28 @@ impl Packed {
         Ok(row)
     }
 
+    /// Appends the fans of all vertices, and returns their place for the table.
+    fn fans(&mut self, asset: &TeSdf) -> Result<u32, String> {
+        if !(asset.faces_enclose_the_solid() && asset.is_detected_on_devices()) {
+            return Ok(shapes::NONE);
+        }
+        let (clear, scale) = (asset.corner_cones(), asset.arrays().frame.scale);
+        let fans = || (0..clear.len() as u32).map(|vertex| asset.faces_at(vertex));
+        let of_faces = 3 * asset.face_count();
+        let end = self.words.len() + 2 * clear.len() + 1 + of_faces;
+        let mut start = u32::try_from(end).map_err(too_many_words)? - of_faces as u32;
+        let mut words = Vec::with_capacity(2 * clear.len() + 1);
+        for (fan, &clear) in fans().zip(clear) {
+            words.extend([start, ((f64::from(clear) * scale) as f32).to_bits()]);
+            start += fan.len() as u32;
+        }
+        self.words_at(words.into_iter().chain([start]).chain(fans().flatten().copied()))
+    }
+
     fn words_at(&mut self, words: impl Iterator<Item = u32>) -> Result<u32, String> {
         let at = self.words.len();
         self.words.extend(words);
-        u32::try_from(at).map_err(|_| "more than 2^32 words of arrays".to_owned())
+        u32::try_from(at).map_err(too_many_words)
     }
 
     fn bytes_at(&mut self, bytes: &[u8]) -> Result<u32, String> {
@@ -180,6 +200,15 @@ fn rule_of(sign: &SignArrays) -> u32 {
         InsideRule::Odd => rule::ODD,
         InsideRule::Winding | InsideRule::Sheet { .. } => rule::WINDING,
     }
+}
+
+fn too_many_words(_: std::num::TryFromIntError) -> String {
+    "more than 2^32 words of arrays".to_owned()
+}
+
+/// A diagonal; 0 where it is infinite.
+fn bounded(diagonal: f64) -> f32 {
+    if diagonal.is_finite() { diagonal as f32 } else { 0.0 }
 }
 
 fn four(record: [f32; 16]) -> [[f32; 4]; 4] {

@@ -31,8 +31,8 @@ pub struct Rules {
     pub turned: bool,
 }
 
-/// Words in the table for each shape. The last two are not used: with a multiple of 16, kernels take
-/// fewer registers (`docs/gpu/measurements.md`).
+/// Words in the table for each shape: a multiple of 16, with which kernels take fewer registers
+/// (`docs/gpu/measurements.md`).
 pub const STRIDE: u32 = 48;
 
 /// The kind: [`MESH`], [`PLANE`], [`BOX`] or [`ROUND`].
@@ -92,10 +92,12 @@ pub const TREE: u32 = 30;
 /// Number of nodes in this tree; 0 for the bisection domain.
 pub const TREE_NODES: u32 = 31;
 
-// The following entries belong to conforming domains, whose vertices may move.
-
 /// Word of the first face's vertices. A face has three.
 pub const FACE_VERTICES: u32 = 32;
+
+// The following entries, up to that of the lowest bad vertex, belong to conforming domains, whose
+// vertices may move.
+
 /// Word of the first tetrahedron's vertices. A tetrahedron has four.
 pub const TET_VERTICES: u32 = 33;
 /// First word of the levels of the face tree: see [`refit`](super::super::deform::refit::refit).
@@ -125,6 +127,14 @@ pub const CLOSING_COUNT: u32 = 43;
 pub const REACH_BEYOND: u32 = 44;
 /// 1 when faces may have the inside in front of them, otherwise 0.
 pub const TURNED: u32 = 45;
+/// Word of the first vertex's fan, the faces that have the vertex. A vertex has two words: the word
+/// of its first face, and the bits of the distance from it within which there are only these faces,
+/// negative where they are not convex, and 0 where this is not known. The word after the last vertex
+/// is the end of the last fan. [`NONE`] where faces do not enclose the solid: such surfaces have no
+/// normal cones.
+pub const FANS: u32 = 46;
+/// Diagonal of the bounds; 0 for a plane.
+pub const DIAGONAL: u32 = 47;
 
 /// No such array, face, cell or vertex.
 pub const NONE: u32 = u32::MAX;

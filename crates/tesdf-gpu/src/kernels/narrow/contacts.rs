@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 use super::super::broad::ordered_pair::OrderedPair;
 use super::super::counters::{CONTACTS, Counters};
 use super::super::field::value::Value;
-use super::super::math::vector::{Row, V3, row_of, to_bits, xyz};
+use super::super::math::vector::{Row, V3, last, row_of, to_bits, xyz};
 
 /// Contacts, or the contacts that a reduction keeps.
 #[derive(CubeType, CubeLaunch)]
@@ -61,7 +61,7 @@ pub fn compare(order: u32, a: u32, b: u32) -> u32 {
     select(order == 0u32, select(a < b, 1u32, select(a > b, 2u32, 0u32)), order)
 }
 
-/// Two instances.
+/// Two instances, or two faces.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Both {
@@ -125,6 +125,12 @@ impl Contacts {
         compare(order, to_bits(p.z), to_bits(q.z))
     }
 
+    /// The faces of a contact: of both shapes.
+    pub fn faces(&self, contact: u32) -> Both {
+        let at = (contact * WORDS) as usize;
+        Both { a: self.words[at + 2], b: self.words[at + 4] }
+    }
+
     /// The instances of a contact: that of the surface, and that of the field.
     pub fn instances(&self, contact: u32) -> Both {
         let at = (contact * WORDS) as usize;
@@ -140,8 +146,20 @@ impl Contacts {
         xyz(self.point_and_distance(contact))
     }
 
+    pub fn distance(&self, contact: u32) -> f32 {
+        last(self.point_and_distance(contact))
+    }
+
+    /// The gradient, or the normal that [`turn`](Self::turn) has put in its place.
     pub fn gradient(&self, contact: u32) -> V3 {
         xyz(self.rows[(contact * ROWS + 1u32) as usize])
+    }
+
+    /// Replaces the gradient by a normal. The cosine stays that of the gradient.
+    pub fn turn(&mut self, contact: u32, normal: V3) {
+        let at = (contact * ROWS + 1u32) as usize;
+        let cosine = last(self.rows[at]);
+        self.rows[at] = row_of(normal, cosine);
     }
 
     /// The point of b.

@@ -1,4 +1,5 @@
 //! Narrow phase: finds the least signed distance over a node or a polygon.
+pub mod cones;
 pub mod contacts;
 pub mod exact;
 pub mod exact_faces;

@@ -2,7 +2,7 @@
 use cubecl::prelude::*;
 
 use super::super::math::pose::pose;
-use super::super::math::vector::{Row, V3, last};
+use super::super::math::vector::{Row, V3};
 use super::contacts::Contacts;
 
 /// Contacts in the frame and unit of the world, in `f32`. A vector takes three numbers.
@@ -42,7 +42,7 @@ pub fn to_world(
         put(&mut out.points_a, at, field.to_world(contacts.point(contact)));
         put(&mut out.points_b, at, field.to_world(contacts.closest(contact)));
         put(&mut out.normals, at, field.rotation.rotate(contacts.gradient(contact)));
-        out.distances[at] = last(contacts.point_and_distance(contact)) * field.unit;
+        out.distances[at] = contacts.distance(contact) * field.unit;
         out.instances[2 * at] = ids[both.a as usize];
         out.instances[2 * at + 1] = ids[both.b as usize];
     }

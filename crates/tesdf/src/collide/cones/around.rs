@@ -7,13 +7,13 @@ use crate::asset::corner_cones::CONVEX;
 use crate::geometry::Triangle;
 
 /// A place with more faces is left as it is.
-const MOST_FACES: usize = 64;
+pub const MOST_FACES: usize = 64;
 
 /// The surroundings of a vertex must be clear up to this multiple of the limit of a place.
-const CLEAR: f64 = 4.0;
+pub const CLEAR: f64 = 4.0;
 
 /// On a side, the vertices must be farther than this multiple of the limit.
-const BESIDE: f64 = 1e3;
+pub const BESIDE: f64 = 1e3;
 
 /// The different normals of the faces within `limit` of a place, from a face on, in the unit of the
 /// mesh.

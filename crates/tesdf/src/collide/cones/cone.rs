@@ -4,7 +4,7 @@ use glam::DVec3;
 
 /// Sine of the angle by which a normal may be out of a cone: bodies that turn by less in a step can
 /// touch there.
-const SLOPE: f64 = 0.1;
+pub const SLOPE: f64 = 0.1;
 
 /// Faces that are turned against each other by more (rad) do not touch with their insides.
 pub const PARALLEL: f64 = 1e-3;
@@ -13,10 +13,10 @@ pub const PARALLEL: f64 = 1e-3;
 pub const SAME: f64 = 1e-6;
 
 /// A ray is in a cone when it is nearer to it than this (rad).
-const NEAR: f64 = 1e-4;
+pub const NEAR: f64 = 1e-4;
 
 /// Maximum number of times that a direction is moved into one cone and then into the other one.
-const ALTERNATIONS: usize = 4;
+pub const ALTERNATIONS: usize = 4;
 
 /// A place with more different normals is left as it is.
 pub const MOST: usize = 12;

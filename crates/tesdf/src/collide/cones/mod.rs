@@ -25,6 +25,13 @@ use around::around;
 use cone::{Cone, Normals, PARALLEL, SAME, clamped, common, crossing, least_cosine};
 pub use elsewhere::{in_cones, keep_different};
 
+/// The limits of the rule, for kernels on other devices.
+pub mod limits {
+    pub use super::around::{BESIDE, CLEAR, MOST_FACES};
+    pub use super::cone::{ALTERNATIONS, MOST, NEAR, PARALLEL, SAME, SLOPE};
+    pub use crate::asset::corner_cones::CONVEX;
+}
+
 /// A place belongs to a feature when it is nearer than this: parts of the diagonals of the smaller
 /// and of the larger body. The search knows a place to its tolerance.
 const OF_SMALLER: f64 = 1e-6;

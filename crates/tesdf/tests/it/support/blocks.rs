@@ -1,9 +1,7 @@
 //! Boxes, as meshes and as shapes, and the normals of contacts of a box on its edge or corner.
 use std::sync::Arc;
 
-use tesdf::collide::{
-    CollideOptions, Contact, Contacts, ContactsPer, Instance, InstanceId, Mode, Pose, Scene, Shape,
-};
+use tesdf::collide::{CollideOptions, Contact, ContactsPer, Instance, InstanceId, Mode, Pose, Scene, Shape};
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 
@@ -61,16 +59,34 @@ impl Block {
     }
 }
 
+/// Sine of the angle by which a normal may be out of a cone (`docs/math.md`, section 18).
+pub const SLOPE: f64 = 0.1;
+
+/// A point is on a side of a box of size 1 when it is nearer.
+pub const ON_SIDE: f64 = 5e-6;
+
+/// How well a detection knows contacts.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    /// A point belongs to a feature up to this distance.
+    pub near: f64,
+    /// Error of distances.
+    pub tolerance: f64,
+    /// Error of the normal of a face.
+    pub direction: f64,
+}
+
 /// Contacts up to this distance.
 const CONTACT_DISTANCE: f64 = 2e-3;
 
 /// Contacts of a floor's face with an edge or a corner of a box have the normal of the floor, in each
 /// mode of faces and for each kind of contacts: those right over each other. All others, but the
 /// minima, are along the way between their points, as far as these are known (`docs/math.md`, section
-/// 18): a point belongs to a feature up to `near`, and distances have an error of `tolerance`.
+/// 18).
 pub fn edges_are_pushed_along_the_normal_of_the_floor(
-    detect: &dyn Fn(&Scene, &CollideOptions) -> Contacts,
-    [near, tolerance]: [f64; 2],
+    detect: &dyn Fn(&Scene, &CollideOptions) -> Vec<Contact>,
+    kinds: &[ContactsPer],
+    Known { near, tolerance, direction }: Known,
 ) {
     let mut random = Random(29);
     let mut worlds: Vec<[Block; 2]> = Vec::new();
@@ -105,7 +121,7 @@ pub fn edges_are_pushed_along_the_normal_of_the_floor(
         }
     }
     for mode in [Mode::Exact, Mode::Face] {
-        for contacts_per in [ContactsPer::Cell, ContactsPer::Face, ContactsPer::Minimum] {
+        for &contacts_per in kinds {
             let options = CollideOptions {
                 contacts_per,
                 contact_distance: CONTACT_DISTANCE,
@@ -118,7 +134,7 @@ pub fn edges_are_pushed_along_the_normal_of_the_floor(
                 // Well within the limit.
                 if is_of_edge(&worlds[world], c, 0.4 * near) {
                     let up = if is_floor(c.instance_a) { -c.normal } else { c.normal };
-                    assert!(up.distance(DVec3::Z) < 1e-9, "{mode:?} per {contacts_per:?}: {c:?}");
+                    assert!(up.distance(DVec3::Z) < direction, "{mode:?} per {contacts_per:?}: {c:?}");
                     with_edge[world] += usize::from(is_floor(c.instance_a));
                 } else if contacts_per != ContactsPer::Minimum {
                     let way = c.point_a - c.point_b;
@@ -152,4 +168,88 @@ fn is_of_edge([floor, block]: &[Block; 2], c: &Contact, near: f64) -> bool {
     floor.sides_at(below, 1e-3) == 1
         && block.sides_at(above, near) >= 2
         && (above - below).truncate().length() <= near
+}
+
+/// Two boxes of size 1 that nearly touch at random features: `gap` is the distance along the
+/// direction that turns a feature of the second to the first.
+pub fn touching(random: &mut Random, gap: f64) -> [Block; 2] {
+    let mut block = |turned: bool| {
+        let kind = if random.unit() < 0.5 { Kind::Mesh } else { Kind::Formula };
+        let half = DVec3::new(random.between(0.2, 0.4), random.between(0.2, 0.4), random.between(0.2, 0.4));
+        let rotation = if turned { rotation(random) } else { DQuat::IDENTITY };
+        Block { kind, half, pose: Pose { translation: DVec3::ZERO, rotation } }
+    };
+    let flush = block(false);
+    let [first, mut second] = [block(true), block(true)];
+    let mut first = if random.unit() < 0.3 { Block { pose: flush.pose, ..first } } else { first };
+    if random.unit() < 0.3 {
+        // Flush faces and parallel edges.
+        second.pose.rotation = first.pose.rotation;
+    }
+    // The second is moved along a direction until the supports in it are `gap` apart.
+    let side = |block: &Block, axis: usize| block.pose.rotation * DVec3::AXES[axis];
+    let direction = match random.index(3) {
+        0 => side(&first, random.index(3)),
+        1 => side(&first, random.index(3)).cross(side(&second, random.index(3))),
+        _ => random.direction(),
+    };
+    let direction = direction.try_normalize().unwrap_or(DVec3::Z);
+    let support = |block: &Block, d: DVec3| (block.pose.rotation.inverse() * d).abs().dot(block.half);
+    let way = support(&first, direction) + support(&second, direction) + gap;
+    let aside = 0.2 * random.in_cube().reject_from_normalized(direction);
+    first.pose.translation = 0.1 * random.in_cube();
+    second.pose.translation = first.pose.translation + way * direction + aside;
+    [first, second]
+}
+
+/// Contacts per face and per cell keep their points, which need not be the nearest places of two
+/// features. Where bodies touch there and have a direction in both cones, the normal is such a one.
+/// Points that are farther than `on_side` from a side, but not farther than [`ON_SIDE`], may count
+/// as either.
+pub fn normals_are_in_the_cones_where_these_meet(
+    detect: &dyn Fn(&Scene, &CollideOptions) -> Vec<Contact>,
+    gaps: &[f64],
+    on_side: f64,
+) {
+    let mut random = Random(0xced);
+    let worlds: Vec<[Block; 2]> = (0..200).map(|k| touching(&mut random, gaps[k % gaps.len()])).collect();
+    let mut scene = Scene::new();
+    for (world, block) in (0..).zip(&worlds).flat_map(|(world, both)| both.map(|block| (world, block))) {
+        let shape = scene.add_shape(block.shape()).expect("a good shape");
+        scene.add(Instance { world, ..Instance::new(shape, block.pose) }).expect("a good pose");
+    }
+    let (mut seen, mut none) = (0, 0);
+    for contacts_per in [ContactsPer::Face, ContactsPer::Cell] {
+        let options =
+            CollideOptions { contacts_per, contact_distance: 2e-3, ..CollideOptions::with_mode(Mode::Exact) };
+        let found = detect(&scene, &options).into_iter();
+        for c in found.filter(|c| c.converged && c.distance.abs() <= 1e-6) {
+            let [a, b] = [c.instance_a, c.instance_b].map(|id| worlds[id.0 as usize / 2][id.0 as usize % 2]);
+            let near = ON_SIDE + 2.0 * c.distance.abs();
+            let is_known = |block: &Block, p: DVec3| block.sides_at(p, on_side) == block.sides_at(p, near);
+            if !(is_known(&a, c.point_a) && is_known(&b, c.point_b)) {
+                continue;
+            }
+            let out = |n: DVec3| {
+                let of_a = a.out_of_cone(c.point_a, -n, near);
+                // A face of b is a wall for all points of a.
+                let of_a = if b.sides_at(c.point_b, near) == 1 { 0.0 } else { of_a };
+                of_a.max(b.out_of_cone(c.point_b, n, near))
+            };
+            // The normals of faces and the common normals of edges.
+            let (of_a, of_b) = (a.axes(), b.axes());
+            let across = of_a.iter().flat_map(|p| of_b.map(|q| p.cross(q).normalize_or(*p)));
+            let directions = of_a.into_iter().chain(of_b).chain(across).flat_map(|n| [n, -n]);
+            // Up to the tolerance of faces that are parallel.
+            let is_allowed = directions.map(out).any(|out| out < 1e-4);
+            seen += usize::from(is_allowed);
+            none += usize::from(!is_allowed);
+            let own = out(c.normal);
+            assert!(
+                !is_allowed || own <= 1.01 * SLOPE,
+                "{own} out of a cone, {contacts_per:?}: {a:?} {b:?} {c:?}"
+            );
+        }
+    }
+    assert!(seen > 1000, "{seen} contacts, and {none} without a common direction");
 }
