@@ -2,8 +2,6 @@
 use tesdf_sim::Summary;
 use tesdf_sim::criterion::{CriterionReport, Rows};
 
-use crate::terminal::report;
-
 /// The rows of all criteria.
 pub fn rows(summary: &Summary) -> Rows {
     summary.criteria.iter().flat_map(of_one).collect()

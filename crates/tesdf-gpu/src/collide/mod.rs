@@ -4,6 +4,8 @@ mod broad;
 mod buffers;
 mod contacts;
 mod counts;
+mod device_contacts;
+mod given_poses;
 mod middle;
 mod narrow;
 mod on_device;
@@ -28,7 +30,8 @@ use tesdf::collide::{
 use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
 use contacts::{Row, Words, contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
-pub use on_device::{DeviceContacts, GivenPoses};
+pub use device_contacts::DeviceContacts;
+pub use given_poses::GivenPoses;
 use on_processor::{Divided, with_pairs};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,

@@ -1,13 +1,11 @@
 //! Contacts that stay on the device, for a physics engine on the same device. Poses may come from an
 //! array there, too.
-use glam::{DQuat, DVec3, Vec3};
 use tesdf::collide::internal::Ahead;
-use tesdf::collide::{
-    CollideError, CollideOptions, HiddenOverlap, Instance, InstanceId, Pose, Reduction, Scene, Shape,
-    Velocity,
-};
+use tesdf::collide::{CollideError, CollideOptions, HiddenOverlap, InstanceId, Reduction, Scene, Shape};
 
 use super::contacts::contacts;
+use super::device_contacts::DeviceContacts;
+use super::given_poses::GivenPoses;
 use super::on_processor::{has_undetected, with_pairs_on_device};
 use super::pass::{GROUP, Normals, Parts, Pass, parts};
 use super::scene::instances::Instances;
@@ -15,156 +13,11 @@ use super::scene::placed::Placed;
 use super::stages::{Stages, Timing, launch};
 use super::{Detector, possible, wants_minima};
 use crate::GpuError;
-use crate::device::{Buffer, Device, DeviceArray, spread};
-use crate::kernels::broad::place::{self, GivenLaunch, POSE, UNIT_LENGTH, VELOCITY};
+use crate::device::{Buffer, spread};
+use crate::kernels::broad::place::{self, GivenLaunch};
 use crate::kernels::field::nearest::FAR;
 use crate::kernels::narrow::sorted;
-use crate::kernels::narrow::world::{self, WorldContactsLaunch};
-
-/// Poses and velocities of all instances of a scene, on the device. Row *i* is that of the *i*-th
-/// instance in the order of ids.
-#[derive(Clone, Copy)]
-pub struct GivenPoses<'a> {
-    /// `[N, 7]`: x y z of the translation in the world's unit, and the unit quaternion qx qy qz qw,
-    /// whose length may be off by 1e-5.
-    pub poses: &'a DeviceArray<f32>,
-    /// `[N, 6]`: velocity of the instance's origin, and angular velocity in radians, both in the
-    /// world frame. `None`: all are at rest. Only the [speculative
-    /// time](CollideOptions::speculative_time) uses it.
-    pub velocities: Option<&'a DeviceArray<f32>>,
-}
-
-/// Contacts on the device, in the world's frame and unit, in the order of
-/// [`detect`](Detector::detect) by world, pair of instances, and order of the pair. Faces have the
-/// order of the asset there.
-#[derive(Clone)]
-pub struct DeviceContacts {
-    /// Number of contacts, *N*.
-    pub count: usize,
-    /// `[N, 3]`: witness points on the surface of the first instance.
-    pub points_a: DeviceArray<f32>,
-    /// `[N, 3]`: the points of the second instance's surface that are closest to these.
-    pub points_b: DeviceArray<f32>,
-    /// `[N, 3]`: unit normals, from the second instance to the first: those that
-    /// [`detect`](Detector::detect) gives. A contact of faces has one that both bodies allow; the
-    /// others, and those of bodies whose vertices have moved, have the gradient of the signed
-    /// distance of the second instance.
-    pub normals: DeviceArray<f32>,
-    /// `[N]`: signed distances.
-    pub distances: DeviceArray<f32>,
-    /// `[N, 2]`: ids of the instance of the surface and of that of the field.
-    pub instances: DeviceArray<u32>,
-    /// Pairs that overlap without a contact that shows it.
-    pub hidden: Vec<HiddenOverlap>,
-}
-
-impl DeviceContacts {
-    fn empty(device: &Device, count: usize) -> Result<Self, GpuError> {
-        Ok(Self {
-            count,
-            points_a: DeviceArray::empty(device, 3 * count)?,
-            points_b: DeviceArray::empty(device, 3 * count)?,
-            normals: DeviceArray::empty(device, 3 * count)?,
-            distances: DeviceArray::empty(device, count)?,
-            instances: DeviceArray::empty(device, 2 * count)?,
-            hidden: Vec::new(),
-        })
-    }
-
-    fn argument(&self) -> WorldContactsLaunch {
-        WorldContactsLaunch::new(
-            self.points_a.buffer().words(),
-            self.points_b.buffer().words(),
-            self.normals.buffer().words(),
-            self.distances.buffer().words(),
-            self.instances.buffer().words(),
-        )
-    }
-}
-
-impl GivenPoses<'_> {
-    /// Checks the lengths of the arrays for this number of instances.
-    fn check(&self, instances: usize) -> Result<(), GpuError> {
-        let check = |array, found: usize, each: u32| {
-            let expected = instances * each as usize;
-            let text = || format!("{expected}: {each} for each of {instances} instances");
-            if found == expected { Ok(()) } else { Err(GpuError::Length { array, found, expected: text() }) }
-        };
-        check("poses", self.poses.len(), POSE)?;
-        self.velocities.map_or(Ok(()), |velocities| check("velocities", velocities.len(), VELOCITY))
-    }
-
-    /// The rows of the arrays.
-    fn rows(&self, device: &Device) -> Result<Vec<GivenRow>, GpuError> {
-        let poses = self.poses.read(device)?;
-        let velocities = self.velocities.map(|all| all.read(device)).transpose()?.unwrap_or_default();
-        let mut velocities = velocities.as_chunks().0.iter();
-        let row =
-            |pose: &[f32; POSE as usize]| GivenRow { pose: *pose, velocity: velocities.next().copied() };
-        Ok(poses.as_chunks().0.iter().map(row).collect())
-    }
-
-    /// The error of the first instance with a pose or velocity that is none.
-    pub(super) fn first_bad(&self, device: &Device, instances: &Instances) -> Result<GpuError, GpuError> {
-        let mut ids = instances.ids.clone();
-        ids.sort_unstable();
-        let rows = self.rows(device)?;
-        let bad = ids.iter().zip(&rows).find_map(|(id, row)| row.check(*id).err());
-        // The kernel's numbers may be rounded otherwise.
-        Ok(bad.unwrap_or_else(|| GpuError::Instance {
-            instance: ids.first().map_or(0, |id| id.0 as usize),
-            reason: "an array has a pose that is none; normalise the quaternions".into(),
-        }))
-    }
-
-    /// A scene with its instances where the arrays have them.
-    fn placed(&self, device: &Device, scene: &Scene) -> Result<Scene, GpuError> {
-        let rows = self.rows(device)?;
-        let place = |((id, instance), row): ((InstanceId, &Instance), &GivenRow)| {
-            row.check(id)?;
-            Ok((id, Instance { pose: row.pose(), velocity: row.velocity(), ..*instance }))
-        };
-        let updates = scene.instances().zip(&rows).map(place).collect::<Result<Vec<_>, GpuError>>()?;
-        let mut placed = scene.clone();
-        placed.update(&updates)?;
-        Ok(placed)
-    }
-}
-
-/// A row of [`GivenPoses`].
-struct GivenRow {
-    pose: [f32; POSE as usize],
-    velocity: Option<[f32; VELOCITY as usize]>,
-}
-
-impl GivenRow {
-    fn check(&self, id: InstanceId) -> Result<(), GpuError> {
-        let Self { pose, velocity } = self;
-        let velocity = velocity.as_ref().map_or(&[][..], |v| v);
-        let length = Vec3::from_slice(&pose[3..6]).extend(pose[6]).length();
-        let is_pose = pose[..3].iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= UNIT_LENGTH;
-        if is_pose && velocity.iter().all(|x| x.is_finite()) {
-            return Ok(());
-        }
-        Err(GpuError::Instance {
-            instance: id.0 as usize,
-            reason: format!(
-                "the arrays place it at {pose:?} with the velocity {velocity:?}; expected finite numbers, and a \
-                 quaternion of length 1, up to {UNIT_LENGTH:e}"
-            ),
-        })
-    }
-
-    fn pose(&self) -> Pose {
-        let [x, y, z, qx, qy, qz, qw] = self.pose.map(f64::from);
-        Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(qx, qy, qz, qw).normalize() }
-    }
-
-    fn velocity(&self) -> Velocity {
-        let [x, y, z, a, b, c] = self.velocity.unwrap_or_default().map(f64::from);
-        Velocity { linear: DVec3::new(x, y, z), angular: DVec3::new(a, b, c) }
-    }
-}
+use crate::kernels::narrow::world;
 
 impl Pass<'_> {
     /// Writes the poses and motions of all instances from the arrays.

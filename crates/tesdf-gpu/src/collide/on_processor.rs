@@ -6,7 +6,7 @@ use tesdf::collide::{
     Scene, Shape, Statistics, detect_pairs,
 };
 
-use super::on_device::DeviceContacts;
+use super::device_contacts::DeviceContacts;
 use crate::GpuError;
 use crate::device::{Device, DeviceArray, Word};
 

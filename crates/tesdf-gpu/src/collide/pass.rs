@@ -4,7 +4,7 @@ use tesdf::collide::{CollideOptions, ContactsPer, Mode};
 
 use super::buffers::{ROW, WORD};
 use super::counts::Counts;
-use super::on_device::GivenPoses;
+use super::given_poses::GivenPoses;
 use super::scene::instances::Instances;
 use super::stages::{Stages, Timing, launch};
 use super::{Detector, Pruning};

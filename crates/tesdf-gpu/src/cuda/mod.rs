@@ -70,4 +70,6 @@ mod source;
 pub use kernel_cache::compile_ahead;
 #[cfg(feature = "cuda")]
 pub use nvrtc::{Compiled, Resources, compile};
-pub use source::{Count, CudaSource, sources};
+pub use source::{CudaSource, sources};
+
+pub use crate::kernels::catalog::Count;

@@ -31,9 +31,10 @@ use super::driver::{self, Event, Facts, Function, Gpu};
 use super::kernel_cache;
 use super::memory::{ALIGNMENT, Memory, Storage};
 use super::nvrtc::architecture;
-use super::source::{Count, least_hardware, properties, source};
+use super::source::{least_hardware, properties, source};
 use crate::GpuError;
-use crate::device::STREAM;
+use crate::device::stream::STREAM;
+use crate::kernels::catalog::Count;
 
 /// An indirect launch starts this many blocks for each block that the GPU runs at the same time.
 /// With more than one, the GPU starts the next block as soon as one ends early.

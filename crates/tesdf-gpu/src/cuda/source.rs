@@ -16,7 +16,7 @@ use cubecl_cpp::target::Cuda;
 use cubecl_runtime::kernel::BufferIOAttr;
 
 use crate::GpuError;
-use crate::kernels::catalog;
+use crate::kernels::catalog::{self, Count};
 
 /// Definitions before the text of each kernel.
 ///
@@ -36,15 +36,6 @@ const HEAD: &str = "#define fma(a, b, c) ((a) * (b) + (c))
 /// spilled values are read only after the loops; `tesdf-lab kernels`
 /// prints the number of spilled bytes.
 const BLOCKS: [(&str, u32); 2] = [("narrow_faces_", 24), ("narrow_exact_", 20)];
-
-/// Source of the number of blocks of a launch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Count {
-    /// The host knows the number.
-    Direct,
-    /// A buffer on the device holds the number (an indirect dispatch).
-    Indirect,
-}
 
 /// The CUDA C++ text of a kernel.
 #[derive(Clone, Debug)]

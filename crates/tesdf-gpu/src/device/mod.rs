@@ -1,6 +1,7 @@
 //! The devices of this machine, and their memory.
 mod array;
 mod buffer;
+pub(crate) mod stream;
 
 use std::fmt;
 use std::time::Duration;
@@ -10,7 +11,6 @@ use cubecl::client::Client;
 use cubecl::features::Plane;
 use cubecl::wgpu::{WgpuDevice, WgpuDeviceKind, WgpuRuntime};
 use cubecl_common::device::{Device as _, DeviceId};
-use cubecl_environment::stream::StreamId;
 use cubecl_runtime::runtime::Runtime;
 
 use crate::GpuError;
@@ -22,11 +22,6 @@ pub(crate) use buffer::{Buffer, spread};
 
 /// The environment variable that selects the device when the program does not.
 pub const DEVICE_VARIABLE: &str = "TESDF_DEVICE";
-
-/// The stream of all work of this crate. By default each thread has a stream of its own, and CubeCL
-/// 0.11.3 then loses buffers that one thread has made and another uses ("Memory location points to
-/// a different allocation").
-pub(crate) const STREAM: StreamId = StreamId { value: 0 };
 
 /// The kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,7 +136,7 @@ impl Id {
         };
         // SAFETY: the stream only orders launches and copies. In one stream all of them are in the
         // order of the calls, whichever threads make these.
-        unsafe { client.set_stream(STREAM) };
+        unsafe { client.set_stream(stream::STREAM) };
         Ok(client)
     }
 

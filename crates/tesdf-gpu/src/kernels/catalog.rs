@@ -27,7 +27,15 @@ use super::narrow::faces::AskedLaunch;
 use super::narrow::world::WorldContactsLaunch;
 use super::reduce::members::{MembersLaunch, TouchingLaunch};
 use super::{GROUP, broad, deform, encode, field, middle, narrow, reduce};
-use crate::cuda::Count;
+
+/// Source of the number of blocks of a launch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Count {
+    /// The host knows the number.
+    Direct,
+    /// A buffer on the device holds the number (an indirect dispatch).
+    Indirect,
+}
 
 /// A kernel in one variant, ready to be compiled.
 pub struct Named {

@@ -3,7 +3,7 @@ use cubecl::prelude::*;
 
 use super::super::narrow::exchange::LANES;
 use super::bits::WORDS;
-use super::clip::Walk;
+use super::walk::Walk;
 
 /// Words of a branch: face, root, cell, depth and path.
 const BRANCH: u32 = 4 + WORDS as u32;

@@ -14,16 +14,16 @@ use cubecl::prelude::*;
 use super::super::broad::meshlets::{Blocks, meshlet_work};
 use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, CANDIDATES, Counters};
-use super::super::field::locate::{Cell, Lambda, is_split};
+use super::super::field::locate::{Cell, is_split};
 use super::super::field::shapes::{BAND, Field, HIGH, LOW, NONE, Shapes, TREE_NODES};
 use super::super::field::tetrahedra::{Around, around_of};
 use super::super::math::vector::v3;
 use super::super::narrow::exchange::LANES;
-use super::bits::{Bits, LEVELS, no_bits};
 use super::branches::no_branches;
-use super::corners::{Corners, corners_in};
+use super::corners::corners_in;
 use super::cut::{Cut, no_polygon, whole};
 use super::items::{Polygons, Subject, subject_of};
+use super::walk::{Walk, no_walk};
 
 /// Steps of a walk between two exchanges of branches. An exchange takes about as long as a step.
 const ROUND: u32 = 16;
@@ -128,44 +128,6 @@ fn reaches_out(field: Field<'_>, subject: Subject) -> bool {
     (conforming && subject.reach > 0.0f32) || (!conforming && subject.reach >= field.number(BAND))
 }
 
-/// A walk through the cells that a face meets, between two steps.
-#[derive(CubeType)]
-pub struct Walk {
-    pub face: u32,
-    pub root: u32,
-    pub cell: u32,
-    pub depth: u32,
-    /// Whether the cell still has to be visited.
-    pub open: bool,
-    /// Whether no step of this walk has been made by this thread.
-    pub is_new: bool,
-    pub path: Bits,
-    /// The levels with a sibling to visit.
-    pub waiting: Bits,
-    /// The first child at each level.
-    pub children: Array<u32>,
-    /// The face's corners at each third level, 12 numbers each.
-    corners: Array<f32>,
-}
-
-#[cube]
-fn no_walk() -> Walk {
-    let mut waiting = no_bits();
-    waiting.clear();
-    Walk {
-        face: 0u32,
-        root: 0u32,
-        cell: 0u32,
-        depth: 0u32,
-        open: false,
-        is_new: false,
-        path: no_bits(),
-        waiting,
-        children: Array::<u32>::new(LEVELS),
-        corners: Array::<f32>::new(comptime!(12 * LEVELS.div_ceil(3))),
-    }
-}
-
 /// A face, and the cells in which it may have polygons.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
@@ -251,42 +213,6 @@ impl Start {
 #[cube]
 fn third(depth: u32) -> u32 {
     depth / 3u32 * 3u32
-}
-
-#[cube]
-impl Walk {
-    /// Keeps the corners in the cell at level `depth`, at each third level.
-    fn keep(&mut self, depth: u32, corners: Corners) {
-        if depth % 3u32 == 0u32 {
-            let at = (4u32 * depth) as usize;
-            self.put(at, corners.a);
-            self.put(at + 4usize, corners.b);
-            self.put(at + 8usize, corners.c);
-        }
-    }
-
-    /// The corners in the cell at level `depth` of the path, from those kept at level `base`.
-    fn corners(&self, base: u32, depth: u32) -> Corners {
-        let at = (4u32 * base) as usize;
-        let kept = Corners { a: self.get(at), b: self.get(at + 4usize), c: self.get(at + 8usize) };
-        self.path.follow_from(kept, base, depth)
-    }
-
-    fn put(&mut self, at: usize, l: Lambda) {
-        self.corners[at] = l.l0;
-        self.corners[at + 1usize] = l.l1;
-        self.corners[at + 2usize] = l.l2;
-        self.corners[at + 3usize] = l.l3;
-    }
-
-    fn get(&self, at: usize) -> Lambda {
-        Lambda {
-            l0: self.corners[at],
-            l1: self.corners[at + 1usize],
-            l2: self.corners[at + 2usize],
-            l3: self.corners[at + 3usize],
-        }
-    }
 }
 
 /// Goes on with a walk, by [`ROUND`] steps at most, and writes the polygons of the face in its cells.

@@ -9,3 +9,4 @@ pub mod hidden;
 pub mod items;
 pub mod nodes;
 pub mod outside;
+pub mod walk;

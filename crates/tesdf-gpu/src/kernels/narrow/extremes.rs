@@ -20,17 +20,9 @@ use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
 use super::near::{FACES, Walk, axes_of};
 use super::piece::{Lowest, Pool};
 use super::polygon_distance::weights_of;
-use super::taken::{Memory, Taken, nothing_at};
+use super::taken::{BETWEEN, DIRECTIONS, MINIMUM, Memory, SAME, Taken, nothing_at};
 use super::work::Work;
 
-/// Number of directions in the plane of a face. Each has a slot for what was taken.
-pub const DIRECTIONS: u32 = internal::DIRECTIONS as u32;
-/// The slot of the minimum, ...
-const MINIMUM: u32 = DIRECTIONS;
-/// ... and that of what stands out between the first extreme and the second one.
-const BETWEEN: u32 = MINIMUM + 1;
-/// Number of slots.
-pub const SLOTS: u32 = BETWEEN + DIRECTIONS;
 /// A face is large when its longest edge exceeds this fraction of the smaller body's diagonal.
 const LARGE: f32 = internal::LARGE as f32;
 /// The field opposes a face when the cosine between gradient and normal is below this.
@@ -46,8 +38,6 @@ const TRIALS: u32 = internal::TRIALS as u32;
 /// Rounding of a height, in the local frame. On the processor, which computes in `f64`, it is
 /// 1e-12.
 const HEIGHT: f32 = 1e-6;
-/// Points that are nearer to each other (local frame) are the same. The processor compares bits.
-pub const SAME: f32 = 2e-6;
 
 /// A face, the field of the other body, and the limits of the contacts.
 #[derive(CubeType, Clone, Copy)]

@@ -1,13 +1,24 @@
 //! The points of a face that were taken as contacts, and the memory of the group that takes them.
 use cubecl::prelude::*;
+use tesdf::collide::internal;
 
 use super::super::field::nearest::FAR;
 use super::super::field::shapes::NONE;
 use super::super::field::value::Value;
 use super::super::math::vector::{V3, zero};
-use super::extremes::{DIRECTIONS, SAME, SLOTS};
 use super::near::Walk;
 use super::piece::Pool;
+
+/// Number of directions in the plane of a face. Each has a slot for what was taken.
+pub const DIRECTIONS: u32 = internal::DIRECTIONS as u32;
+/// The slot of the minimum, ...
+pub const MINIMUM: u32 = DIRECTIONS;
+/// ... and that of what stands out between the first extreme and the second one.
+pub const BETWEEN: u32 = MINIMUM + 1;
+/// Number of slots.
+const SLOTS: u32 = BETWEEN + DIRECTIONS;
+/// Points that are nearer to each other (local frame) are the same. The processor compares bits.
+pub const SAME: f32 = 2e-6;
 
 /// A point of a face that is a contact, if `is_taken`.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
