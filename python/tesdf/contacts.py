@@ -284,7 +284,7 @@ class DeviceContacts(_Rows):
     point_b: DeviceArray
     """[N, 3] float32, the point of b's surface that is closest to it"""
     normal: DeviceArray
-    """[N, 3] float32, unit gradient of b's signed distance; points from b to a"""
+    """[N, 3] float32, unit vector from b to a: that of `detect`"""
     distance: DeviceArray
     """[N] float32, signed distance of b; negative where the bodies overlap"""
     instances: DeviceArray

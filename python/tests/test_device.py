@@ -277,8 +277,12 @@ def test_contacts_stay_on_the_device(linked, device):
         there = rows_of(found)
         nearest = np.abs(there[:, None] - rows[None]).max(axis=2)
         assert (nearest.min(axis=0) < 1e-6).all() and (nearest.min(axis=1) < 1e-6).all()
-        back = found.point_b.numpy() + found.distance.numpy()[:, None] * found.normal.numpy()
-        assert np.abs(back - found.point_a.numpy()).max() < 8 * DISTANCE * DIAGONAL
+        distance = found.distance.numpy()
+        back = found.point_b.numpy() + distance[:, None] * found.normal.numpy()
+        # A face's nearest place is known to the root of the distance's error.
+        place = 0 if options["mode"] == "node" else np.sqrt(8 * DISTANCE * DIAGONAL * np.abs(distance))
+        off = np.linalg.norm(back - found.point_a.numpy(), axis=1)
+        assert (off < 8 * DISTANCE * DIAGONAL + place).all()
 
 
 def test_poses_come_from_arrays(linked, asset, device):

@@ -7,10 +7,11 @@ use super::{Counting, Exchange, FINEST, Lanes};
 use crate::GpuError;
 use crate::device::Buffer;
 use crate::kernels::counters::{CONTACTS, POLYGONS};
+use crate::kernels::narrow::cones::contact;
 use crate::kernels::narrow::exact::AskedExactLaunch;
 use crate::kernels::narrow::exchange::{LANES, Variant};
 use crate::kernels::narrow::faces::AskedLaunch;
-use crate::kernels::narrow::{cones, exact, exact_faces, faces, nodes, whole_faces};
+use crate::kernels::narrow::{exact, exact_faces, faces, nodes, whole_faces};
 
 impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
@@ -32,7 +33,7 @@ impl Pass<'_> {
             "normals",
             per_contact,
             GROUP,
-            cones::in_cones(shapes.argument(), pairs, tolerances.words(), counters, contacts)
+            contact::in_cones(shapes.argument(), pairs, tolerances.words(), counters, contacts)
         )
     }
 

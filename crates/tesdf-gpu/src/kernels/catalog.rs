@@ -142,7 +142,7 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
         Direct narrow::sorted::begin, GROUP, (words(), 1);;
         Direct narrow::sorted::merge, GROUP, (contacts(), words(), words(), 1, 1);;
         Direct narrow::world::to_world, GROUP, (contacts(), words(), rows(), words(), in_world(), 1);;
-        Indirect narrow::cones::in_cones, GROUP, (shapes(), pairs(), words(), counters(), contacts());;
+        Indirect narrow::cones::contact::in_cones, GROUP, (shapes(), pairs(), words(), counters(), contacts());;
         Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), false);;

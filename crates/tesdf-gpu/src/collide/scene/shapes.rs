@@ -33,7 +33,8 @@ pub struct GpuShapeId(pub(crate) u32);
 pub struct ShapeBytes {
     /// Kind of each shape, and the start of its arrays.
     pub table: usize,
-    /// Forests, lists, palettes, bounds of cells, children of face-tree nodes.
+    /// Forests, lists, palettes, bounds of cells, children of face-tree nodes, vertices of faces, and
+    /// faces of vertices.
     pub words: usize,
     /// Faces, boxes of the face trees, balls of the meshlets.
     pub rows: usize,

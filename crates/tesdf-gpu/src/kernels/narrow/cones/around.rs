@@ -105,10 +105,11 @@ impl Field<'_> {
                 Found { faces: Array::<u32>::new(comptime!(MOST_FACES as usize + 1usize)), count: 0u32 };
             found.add(place.face);
             let first = self.face(place.face);
-            if first.within_sides(place.at) <= place.limit
-                && !self.known_around(place, first, &mut found, cones, cone)
-            {
-                self.search(place, &mut found);
+            if first.within_sides(place.at) <= place.limit {
+                let is_known = self.known_around(place, first, &mut found, cones, cone);
+                if !is_known {
+                    self.search(place, &mut found);
+                }
             }
             if found.count <= MOST_FACES {
                 self.convex(&found, cones, cone);
