@@ -41,11 +41,10 @@ fn normals_are_in_the_cones_where_these_meet_in_both_places() {
     let read = |scene: &Scene, options: &CollideOptions| {
         found(scene, options, DetectorOptions::default()).0.into_vec()
     };
-    let detections: [&dyn Fn(&Scene, &CollideOptions) -> Vec<Contact>; 2] = [&read, &staying];
-    for detect in detections {
-        // The smallest of the larger diagonals is 0.7.
-        normals_are_in_the_cones_where_these_meet(detect, &[0.0, 1e-7, -1e-7], 0.5 * ROUNDING);
-    }
+    // The smallest of the larger diagonals is 0.7.
+    let (gaps, on_side) = ([0.0, 1e-7, -1e-7], 0.5 * ROUNDING);
+    normals_are_in_the_cones_where_these_meet(&read, &gaps, on_side);
+    normals_are_in_the_cones_where_these_meet(&staying, &gaps, on_side);
 }
 
 /// Whether a normal is not the gradient at the point of *a*. Only fields of meshes are asked.

@@ -1,4 +1,5 @@
 //! Scene files in TOML: bodies, joints, scripts, detection, solver, recording and success criteria.
+//! `docs/scene-file.md` lists all keys.
 //!
 //! ```toml
 //! time_step = 1e-3             # s
@@ -307,7 +308,7 @@ pub struct DetectorSection {
     /// Cosine filter of the modes `face` and `exact`.
     pub cos_theta: Option<f64>,
     /// Contacts are recorded up to this distance, m, in addition to the distance that motion can
-    /// close in a step [default: 0.5 % of the diagonal of the smallest free body].
+    /// close in a step [default: 0.5 % of the diagonal of the smallest body that is not fixed].
     pub contact_distance: Option<f64>,
 }
 

@@ -16,6 +16,7 @@ mod passing;
 mod recorded_warnings;
 mod rest;
 mod scene_file;
+mod scene_file_page;
 mod screw;
 mod scripts;
 mod separation;
