@@ -95,7 +95,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     for (k, (name, mut loaded)) in scenes.into_iter().enumerate() {
         if let Some(play) = args.backlash.get(k) {
-            loaded.scene.criterion.set(&ScrewCriterion { backlash: play * 1e-6, ..screw.clone() });
+            loaded.scene.criterion.set(ScrewCriterion { backlash: play * 1e-6, ..screw.clone() });
         }
         let system = loaded.system()?;
         for &mode in &args.modes {

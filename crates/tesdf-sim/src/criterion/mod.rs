@@ -1,4 +1,4 @@
-//! Success criteria of a run. Each has a module of its own and a line in `known`.
+//! Success criteria of a run. Each has a module of its own and a line in `criteria!`.
 mod assembly;
 mod gear_ratio;
 mod hoist;
@@ -25,12 +25,13 @@ pub use transmission::{
 };
 
 use std::fmt;
+use std::sync::Arc;
 
 use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, MapAccess};
 
 use crate::System;
-use section::Kind;
+use section::Named;
 pub use section::{CriterionReport, CriterionSection};
 pub(crate) use section::{Trackers, by_name};
 
@@ -43,8 +44,7 @@ pub struct JointDrift {
     pub angle: f64,
 }
 
-/// A success criterion: the table `[criterion.NAME]` of a scene file. [`CriterionSection::add`] makes
-/// a criterion from outside of this crate known.
+/// A success criterion: the table `[criterion.NAME]` of a scene file.
 pub trait Criterion: Clone + fmt::Debug + Serialize + DeserializeOwned + Send + Sync + 'static {
     /// The name of its table.
     const NAME: &str;
@@ -89,17 +89,30 @@ pub trait Report: Clone + fmt::Debug + Serialize + Send + Sync + 'static {
     fn rows(&self) -> Rows;
 }
 
-/// The criteria of this crate.
-fn known() -> Vec<Kind> {
-    vec![
-        Kind::of::<AssemblyCriterion>(),
-        Kind::of::<GearRatioCriterion>(),
-        Kind::of::<HoistCriterion>(),
-        Kind::of::<InsertionCriterion>(),
-        Kind::of::<LiftCriterion>(),
-        Kind::of::<RestCriterion>(),
-        Kind::of::<ScrewCriterion>(),
-        Kind::of::<SeparationCriterion>(),
-        Kind::of::<TransmissionCriterion>(),
-    ]
+macro_rules! criteria {
+    ($($criterion:ident),* $(,)?) => {
+        /// The names of all criteria.
+        const NAMES: &[&str] = &[$($criterion::NAME),*];
+
+        /// Reads the table of the criterion `name`, if there is such a criterion.
+        fn read<'de, A: MapAccess<'de>>(name: &str, tables: &mut A) -> Result<Option<Named>, A::Error> {
+            $(if name == $criterion::NAME {
+                let criterion: $criterion = tables.next_value()?;
+                return Ok(Some(($criterion::NAME, Arc::new(criterion))));
+            })*
+            Ok(None)
+        }
+    };
 }
+
+criteria!(
+    AssemblyCriterion,
+    GearRatioCriterion,
+    HoistCriterion,
+    InsertionCriterion,
+    LiftCriterion,
+    RestCriterion,
+    ScrewCriterion,
+    SeparationCriterion,
+    TransmissionCriterion,
+);

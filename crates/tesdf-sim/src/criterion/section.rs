@@ -4,94 +4,83 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize, Serializer};
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
-use super::{Criterion, Report, Rows, Tracker, known};
+use super::{Criterion, NAMES, Report, Rows, Tracker, read};
 use crate::System;
 
 /// The success criteria of a run, by the names of their tables. Every criterion that is given must
 /// hold.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct CriterionSection {
-    tables: BTreeMap<String, Value>,
-    /// Criteria from outside of this crate.
-    #[serde(skip)]
-    added: Vec<Kind>,
-}
+#[derive(Clone, Debug, Default)]
+pub struct CriterionSection(BTreeMap<&'static str, Arc<dyn Known>>);
 
 impl PartialEq for CriterionSection {
     /// Whether both have the same criteria with the same values.
     fn eq(&self, other: &Self) -> bool {
-        self.tables == other.tables
+        let values = |section: &Self| section.0.iter().map(|(name, known)| (*name, known.value())).collect();
+        let [one, two]: [Vec<_>; 2] = [self, other].map(values);
+        one == two
     }
 }
 
-/// A criterion that scene files can have.
-#[derive(Clone, Copy)]
-pub(super) struct Kind {
-    name: &'static str,
-    read: fn(&Value) -> Result<Box<dyn Known>, String>,
-}
-
-impl fmt::Debug for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name)
+impl Serialize for CriterionSection {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, known)| (name, known.value())))
     }
 }
 
-impl Kind {
-    pub(super) fn of<C: Criterion>() -> Self {
-        Self { name: C::NAME, read: |table| Ok(Box::new(read::<C>(table)?)) }
+impl<'de> Deserialize<'de> for CriterionSection {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Tables)
     }
 }
 
-fn read<C: Criterion>(table: &Value) -> Result<C, String> {
-    C::deserialize(table).map_err(|e| e.to_string())
+/// Reads the tables of a section.
+struct Tables;
+
+impl<'de> Visitor<'de> for Tables {
+    type Value = CriterionSection;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("tables of criteria")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut tables: A) -> Result<CriterionSection, A::Error> {
+        let mut section = CriterionSection::default();
+        while let Some(name) = tables.next_key::<String>()? {
+            match read(&name, &mut tables)? {
+                Some((name, criterion)) => section.0.insert(name, criterion),
+                None => return Err(A::Error::unknown_field(&name, NAMES)),
+            };
+        }
+        Ok(section)
+    }
 }
 
 impl CriterionSection {
-    /// Makes a criterion from outside of this crate known.
-    pub fn add<C: Criterion>(&mut self) {
-        self.added.push(Kind::of::<C>());
-    }
-
-    /// The criterion `C`, if the scene has it and its values can be read.
-    pub fn get<C: Criterion>(&self) -> Option<C> {
-        self.tables.get(C::NAME).and_then(|table| read(table).ok())
+    /// The criterion `C`, if the scene has it.
+    pub fn get<C: Criterion>(&self) -> Option<&C> {
+        self.0.get(C::NAME).and_then(|known| known.as_any().downcast_ref())
     }
 
     /// Gives the scene the criterion `C`, in place of the one that it may have.
-    pub fn set<C: Criterion>(&mut self, criterion: &C) {
-        // Only a map with other keys than texts has no JSON.
-        self.tables.insert(C::NAME.into(), serde_json::to_value(criterion).unwrap_or_default());
+    pub fn set<C: Criterion>(&mut self, criterion: C) {
+        self.0.insert(C::NAME, Arc::new(criterion));
     }
 
-    /// Changes the criterion `C`; `None` when the scene does not have it, or its values cannot be read.
+    /// Changes the criterion `C`; `None` when the scene does not have it.
     pub fn edit<C: Criterion, R>(&mut self, change: impl FnOnce(&mut C) -> R) -> Option<R> {
-        let mut criterion = self.get()?;
+        let mut criterion = self.get::<C>()?.clone();
         let changed = change(&mut criterion);
-        self.set(&criterion);
+        self.set(criterion);
         Some(changed)
     }
 
     /// Takes the criterion `C` out of the scene, if it has it.
     pub fn remove<C: Criterion>(&mut self) {
-        self.tables.remove(C::NAME);
-    }
-
-    /// The criteria with their names, or the name of a table that cannot be read, and why.
-    fn all(&self) -> Result<Vec<Named>, (String, String)> {
-        let kinds = [known(), self.added.clone()].concat();
-        let one = |(name, table): (&String, &Value)| {
-            let kind = kinds.iter().find(|kind| kind.name == name).ok_or_else(|| {
-                let names = kinds.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
-                format!("there is no such criterion; the criteria are {names}")
-            });
-            kind.and_then(|kind| Ok((kind.name, (kind.read)(table)?))).map_err(|e| (name.clone(), e))
-        };
-        self.tables.iter().map(one).collect()
+        self.0.remove(C::NAME);
     }
 
     /// Checks that the criteria match the bodies and joints. `free` says why a body is driven by more than
@@ -101,7 +90,7 @@ impl CriterionSection {
         system: &System,
         free: impl Fn(&str) -> Result<(), String>,
     ) -> Result<(), (String, String)> {
-        for (name, criterion) in self.all()? {
+        for (&name, criterion) in &self.0 {
             let bodies = criterion.check(system);
             bodies
                 .and_then(|all| all.iter().try_for_each(|body| free(body)))
@@ -112,12 +101,14 @@ impl CriterionSection {
 }
 
 /// A criterion and its name.
-type Named = (&'static str, Box<dyn Known>);
+pub(super) type Named = (&'static str, Arc<dyn Known>);
 
 /// A [`Criterion`] of any kind.
-trait Known {
+pub(super) trait Known: fmt::Debug + Send + Sync {
     fn check(&self, system: &System) -> Result<Vec<String>, String>;
     fn follow(&self, system: &System) -> Result<Box<dyn Followed>, String>;
+    fn value(&self) -> Value;
+    fn as_any(&self) -> &dyn Any;
 }
 
 impl<C: Criterion> Known for C {
@@ -128,10 +119,19 @@ impl<C: Criterion> Known for C {
     fn follow(&self, system: &System) -> Result<Box<dyn Followed>, String> {
         Ok(Box::new(self.track(system)?))
     }
+
+    fn value(&self) -> Value {
+        // Only a map with other keys than texts has no JSON.
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
 }
 
 /// A [`Tracker`] of any kind.
-trait Followed: fmt::Debug + Send + Sync {
+pub(super) trait Followed: fmt::Debug + Send + Sync {
     fn observe(&mut self, system: &System, time_step: f64);
     fn report(&self, name: &'static str, system: &System, failures: &[String]) -> CriterionReport;
     fn copy(&self) -> Box<dyn Followed>;
@@ -172,8 +172,7 @@ impl Clone for Trackers {
 impl Trackers {
     /// Trackers that start from the current state of `system`.
     pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let criteria = section.all().map_err(|(name, e)| format!("{name}: {e}"))?;
-        let followed = criteria.into_iter().map(|(name, criterion)| Ok((name, criterion.follow(system)?)));
+        let followed = section.0.iter().map(|(&name, criterion)| Ok((name, criterion.follow(system)?)));
         Ok(Self(followed.collect::<Result<_, String>>()?))
     }
 
@@ -224,7 +223,7 @@ impl PartialEq for CriterionReport {
 /// Writes reports as fields with the names of their criteria.
 pub(crate) fn by_name<S: Serializer>(reports: &[CriterionReport], serializer: S) -> Result<S::Ok, S::Error> {
     let of_scene = reports.iter().map(|report| (report.name, Some(&report.values)));
-    let is_there = |kind: &Kind| reports.iter().any(|report| report.name == kind.name);
-    let others = known().into_iter().filter(|kind| !is_there(kind)).map(|kind| (kind.name, None));
+    let is_there = |name: &str| reports.iter().any(|report| report.name == name);
+    let others = NAMES.iter().copied().filter(|name| !is_there(name)).map(|name| (name, None));
     serializer.collect_map(of_scene.chain(others))
 }

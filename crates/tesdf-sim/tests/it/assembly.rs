@@ -165,7 +165,7 @@ fn report(change: impl Fn(&mut System, f64)) -> AssemblyReport {
     let loaded = load(balls());
     let mut system = loaded.system().unwrap();
     let mut tracker =
-        AssemblyTracker::new(&loaded.scene.criterion.get::<AssemblyCriterion>().unwrap(), &system).unwrap();
+        AssemblyTracker::new(loaded.scene.criterion.get::<AssemblyCriterion>().unwrap(), &system).unwrap();
     let start = system.states().to_vec();
     let [peg, hole, nut, bolt] = ["peg0", "hole0", "nut0", "bolt0"].map(|name| find(&system, name));
     for step in 1..=100 {

@@ -131,7 +131,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 /// The report of gears with these angles and speeds after each step of 10 ms.
 fn report(angle: impl Fn(f64) -> [f64; 2], speed: [f64; 2]) -> GearRatioReport {
     let (loaded, mut system) = scene();
-    let criterion = &loaded.scene.criterion.get::<GearRatioCriterion>().unwrap();
+    let criterion = loaded.scene.criterion.get::<GearRatioCriterion>().unwrap();
     let mut tracker = GearRatioTracker::new(criterion, &system).unwrap();
     let start = system.states().to_vec();
     for step in 1..=125 {

@@ -46,7 +46,7 @@ fn without_contacts_the_criterion_fails() {
 /// The names of the failures of a peg with this state after each step of 25 ms.
 fn names(state: impl Fn(State, f64) -> State) -> Vec<String> {
     let (loaded, mut system) = scene();
-    let criterion = &loaded.scene.criterion.get::<InsertionCriterion>().unwrap();
+    let criterion = loaded.scene.criterion.get::<InsertionCriterion>().unwrap();
     let mut tracker = InsertionTracker::new(criterion, &system).unwrap();
     let start = system.states()[1];
     for step in 1..=10 {
@@ -96,7 +96,7 @@ fn each_failure_has_its_name() {
 #[test]
 fn values_out_of_range_are_refused() {
     let (loaded, system) = scene();
-    let mut criterion = loaded.scene.criterion.get::<InsertionCriterion>().unwrap();
+    let mut criterion = loaded.scene.criterion.get::<InsertionCriterion>().unwrap().clone();
     criterion.check_every = 0.0;
     let error = InsertionTracker::new(&criterion, &system).unwrap_err();
     assert!(error.contains("check_every is 0; expected a positive number"), "{error}");

@@ -95,7 +95,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 /// The report of a run whose bodies have these states after each step of 0.1 s.
 fn report(state: impl Fn(&mut Vec<State>, f64)) -> LiftReport {
     let (loaded, mut system) = scene();
-    let criterion = &loaded.scene.criterion.get::<LiftCriterion>().unwrap();
+    let criterion = loaded.scene.criterion.get::<LiftCriterion>().unwrap();
     system.set_state(PEG, State::at_rest(Pose::IDENTITY)).unwrap();
     let mut tracker = LiftTracker::new(criterion, &system).unwrap();
     let start = system.states().to_vec();
@@ -136,7 +136,7 @@ fn each_failure_has_its_name() {
 
     let (loaded, system) = scene();
     let mut tracker =
-        LiftTracker::new(&loaded.scene.criterion.get::<LiftCriterion>().unwrap(), &system).unwrap();
+        LiftTracker::new(loaded.scene.criterion.get::<LiftCriterion>().unwrap(), &system).unwrap();
     tracker.observe(&system, 0.05);
     let short = tracker.report(&system);
     assert_eq!(names(&short), ["penetration", "lift"]);

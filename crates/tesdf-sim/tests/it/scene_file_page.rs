@@ -282,5 +282,5 @@ fn the_scene_of_the_page_meets_its_criterion() {
     let loaded = LoadedScene::parse(text.into(), "page.toml").unwrap();
     let system = loaded.system().unwrap();
     let (_, summary) = run(&loaded, system);
-    assert_eq!(summary.passed, Some(true), "{:?}", summary.rest);
+    assert_eq!(summary.passed, Some(true), "{:?}", summary.criteria);
 }

@@ -109,7 +109,7 @@ impl Scenario {
         scene.record.contacts_every = 0;
         match self {
             Self::BoltNut => {
-                let screw = scene.criterion.get::<ScrewCriterion>();
+                let screw = scene.criterion.get::<ScrewCriterion>().cloned();
                 let mut screw = screw.ok_or_else(|| missing("criterion.screw"))?;
                 // The play along the axis is 1.155 times the tolerance, which is radial.
                 screw.backlash = 1.16 * clearance;
@@ -119,17 +119,17 @@ impl Scenario {
                     screw.min_turns *= (QUICK / scene.duration).powi(2);
                     scene.duration = QUICK;
                 }
-                scene.criterion.set(&screw);
+                scene.criterion.set(screw);
             }
             Self::PegInHole => {
-                let insertion = scene.criterion.get::<InsertionCriterion>();
+                let insertion = scene.criterion.get::<InsertionCriterion>().cloned();
                 let mut insertion = insertion.ok_or_else(|| missing("criterion.insertion"))?;
                 let ratio = clearance / insertion.clearance;
                 insertion.clearance = clearance;
                 insertion.depth_tolerance *= ratio;
                 insertion.max_tilt *= ratio;
                 insertion.max_offset *= ratio;
-                scene.criterion.set(&insertion);
+                scene.criterion.set(insertion);
             }
         }
         Ok(loaded)
