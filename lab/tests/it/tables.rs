@@ -119,18 +119,7 @@ fn a_folder_that_cannot_be_made_is_reported_before_the_work() {
 fn table_2_counts_the_queries_of_recorded_poses_beside_the_paper() {
     let folder = Folder::new();
     let recordings = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings");
-    let args = [
-        "evaluate",
-        "table2",
-        "--scenarios",
-        "peg-in-hole",
-        "--frames",
-        "1",
-        "--repeat",
-        "1",
-        "--preset",
-        "fast",
-    ];
+    let args = ["table2", "--scenarios", "peg-in-hole", "--frames", "1", "--repeat", "1", "--preset", "fast"];
     folder.good(&[&args[..], &["--recordings", recordings, "-o", "results"]].concat());
     let read = |name: &str| folder.read(name);
     let table: Value = serde_json::from_str(&read("results/table2.json")).unwrap();

@@ -279,7 +279,6 @@ fn faces_are_as_low_as_their_corners_and_centres() {
 }
 
 #[test]
-#[ignore = "a table of the paper: .ci/release"]
 fn fine_grids_have_nearly_exact_contacts() {
     let options = CollideOptions { contact_distance: REACH, ..CollideOptions::with_mode(Mode::Node) };
     let errors = [64, 256].map(|resolution| {
