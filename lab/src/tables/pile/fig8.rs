@@ -128,7 +128,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let inputs = pile.loaded.geometry_files();
     let sink = Sink::open(&pile_args.output, "fig8", &inputs)?;
     let picture = open_in_folder(&pile_args.output, "fig8.svg", &inputs)?;
-    let criterion = pile.loaded.scene.criterion.get::<SeparationCriterion>();
+    let criterion = pile.loaded.scene.criterion.get::<SeparationCriterion>().cloned();
     let criterion = criterion.filter(|of| !of.limits.is_empty()).ok_or_else(|| {
         Failure::new(format!("{}: it has no criterion.separation", pile.loaded.path.display()))
     })?;
