@@ -16,7 +16,7 @@ pub struct GivenPoses<'a> {
     pub poses: &'a DeviceArray<f32>,
     /// `[N, 6]`: velocity of the instance's origin, and angular velocity in radians, both in the
     /// world frame. `None`: all are at rest. Only the [speculative
-    /// time](CollideOptions::speculative_time) uses it.
+    /// time](tesdf::CollideOptions::speculative_time) uses it.
     pub velocities: Option<&'a DeviceArray<f32>>,
 }
 

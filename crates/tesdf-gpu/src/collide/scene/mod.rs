@@ -1,5 +1,6 @@
 //! Shapes and instances as the device holds them.
 pub mod instances;
+mod movable;
 mod moving;
 pub mod pack;
 pub mod placed;

@@ -8,7 +8,7 @@ use tesdf::collide::Shape;
 use tesdf::geometry::Triangle;
 use tesdf::query::{Arrays, SignArrays};
 
-use super::moving::{face_levels, tree_levels};
+use super::movable::{face_levels, tree_levels};
 use super::roots::Roots;
 use crate::kernels::broad::meshlets::FACES_OF_MESHLET;
 use crate::kernels::deform::refit::GROWN;

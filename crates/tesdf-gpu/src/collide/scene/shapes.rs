@@ -1,7 +1,7 @@
 //! Shapes on the device. Each shape is stored once, for any number of instances.
 use tesdf::collide::Shape;
 
-use super::moving::Moving;
+use super::movable::Moving;
 use super::pack::Packed;
 use crate::GpuError;
 use crate::device::{Buffer, Device};
