@@ -3,7 +3,7 @@ use std::borrow::Cow;
 
 use tesdf::collide::{
     CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, InstancePair, InstancePairs,
-    Scene, Shape, Statistics, detect_pairs,
+    Scene, Shape, detect_pairs,
 };
 
 use super::device_contacts::DeviceContacts;
@@ -14,7 +14,8 @@ use crate::device::{Device, DeviceArray, Word};
 pub struct Divided<'a> {
     /// The scene without the instances of [`on_processor`](Self::on_processor).
     pub on_device: Cow<'a, Scene>,
-    /// The instances that kernels do not detect, in the order of ids. The processor finds all their contacts.
+    /// The instances that kernels do not detect, in the order of ids. The processor finds all their
+    /// contacts.
     pub on_processor: Vec<InstanceId>,
 }
 
@@ -81,17 +82,8 @@ pub fn with_pairs(
         return Ok(found);
     }
     let others = detect_pairs(pairs, scene, options)?;
-    let (one, other) = (found.statistics, others.statistics);
-    let statistics = Statistics {
-        instance_pairs: one.instance_pairs + other.instance_pairs,
-        candidates: one.candidates + other.candidates,
-        polygons: one.polygons + other.polygons,
-        touching: one.touching + other.touching,
-        filtered: one.filtered + other.filtered,
-        reduced: one.reduced + other.reduced,
-        unconverged: one.unconverged + other.unconverged,
-        bytes: one.bytes + other.bytes,
-    };
+    let mut statistics = found.statistics;
+    statistics += others.statistics;
     let mut reductions = [found.reductions.clone(), others.reductions.clone()].concat();
     reductions.sort_by_key(|r| (r.instance_a, r.instance_b));
     let hidden = merged(scene, &found.hidden, &others.hidden);
@@ -139,7 +131,8 @@ struct Both<'a> {
     device: &'a Device,
     /// Those of the processor.
     others: &'a [Contact],
-    /// For each place, the contact that comes there; those of the processor follow those of the device.
+    /// For each place, the contact that comes there; those of the processor follow those of the
+    /// device.
     order: &'a [usize],
 }
 

@@ -27,8 +27,13 @@ const COS_THETA: f64 = 0.3;
 /// it is deeper than this fraction of the deepest of these.
 const PAST_THE_MIDDLE: f64 = 0.5;
 
-/// Maximum number of normals that are tried as directions of a pair.
-const TRIALS: usize = 32;
+/// Maximum number of normals that are tried as directions of a pair. Each takes a look at all
+/// vertices. The pile of 128 shafts has at most some 200 for a pair; with 32 of them, 336 µm of its
+/// overlap were left after six steps, with all of them 215 µm.
+const TRIALS: usize = 256;
+
+/// Cosine of two normals that count as one.
+const SAME: f64 = 1.0 - 1e-9;
 
 /// What a pair of bodies that overlap deeply is pushed along: the direction of its first instance, and
 /// the overlap, m.
@@ -157,10 +162,11 @@ impl Surfaces {
         }
         let [first, second] = pair.map(|instance| self.of(scene, instance));
         let (first, second) = (first?, second?);
-        let tried = pushes
-            .iter()
-            .step_by(pushes.len().div_ceil(TRIALS))
-            .flat_map(|push| [push.direction, -push.direction]);
+        // The contacts of a flat face follow each other, with one normal.
+        let mut directions: Vec<DVec3> = pushes.iter().map(|push| push.direction).collect();
+        directions.dedup_by(|one, other| one.dot(*other) > SAME);
+        let step = directions.len().div_ceil(TRIALS);
+        let tried = directions.iter().step_by(step).flat_map(|&direction| [direction, -direction]);
         let ways = tried.map(|direction| {
             let overlap = extent(first, -direction) + extent(second, direction);
             Way { direction, overlap }

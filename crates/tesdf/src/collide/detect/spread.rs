@@ -78,13 +78,7 @@ pub fn of_pairs(
     let mut reports = Vec::new();
     let mut statistics = Statistics { instance_pairs: pairs.len(), ..Statistics::default() };
     for OfPair { contacts, report, statistics: own } in found {
-        statistics.candidates += own.candidates;
-        statistics.polygons += own.polygons;
-        statistics.touching += own.touching;
-        statistics.filtered += own.filtered;
-        statistics.reduced += own.reduced;
-        statistics.unconverged += own.unconverged;
-        statistics.bytes += own.bytes;
+        statistics += own;
         all.extend(contacts);
         reports.extend(report);
     }

@@ -1,3 +1,4 @@
+use std::ops::AddAssign;
 use std::{slice, vec};
 
 use glam::DVec3;
@@ -86,6 +87,21 @@ pub struct Statistics {
     pub unconverged: usize,
     /// Bytes of all contacts and intermediate products.
     pub bytes: usize,
+}
+
+impl AddAssign for Statistics {
+    fn add_assign(&mut self, other: Self) {
+        let Self { instance_pairs, candidates, polygons, touching, filtered, reduced, unconverged, bytes } =
+            other;
+        self.instance_pairs += instance_pairs;
+        self.candidates += candidates;
+        self.polygons += polygons;
+        self.touching += touching;
+        self.filtered += filtered;
+        self.reduced += reduced;
+        self.unconverged += unconverged;
+        self.bytes += bytes;
+    }
 }
 
 /// The loss from reducing the contacts of a pair of instances.
