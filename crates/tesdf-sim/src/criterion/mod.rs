@@ -51,8 +51,8 @@ pub trait Criterion: Clone + fmt::Debug + Serialize + DeserializeOwned + Send + 
     /// What follows it along a run.
     type Tracker: Tracker;
 
-    /// Checks the values, and that they match the bodies and joints. Returns the names of the bodies that
-    /// contacts alone may drive, and no script.
+    /// Checks the values, and that they match the bodies and joints. Returns the names of the bodies
+    /// that contacts alone may drive, and no script.
     ///
     /// # Errors
     /// A message that names the value that was found and the expected range.

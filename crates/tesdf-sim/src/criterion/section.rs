@@ -83,8 +83,8 @@ impl CriterionSection {
         self.0.remove(C::NAME);
     }
 
-    /// Checks that the criteria match the bodies and joints. `free` says why a body is driven by more than
-    /// contacts. Errors are the name of a criterion and a message.
+    /// Checks that the criteria match the bodies and joints. `free` says why a body is driven by
+    /// more than contacts. Errors are the name of a criterion and a message.
     pub(crate) fn check(
         &self,
         system: &System,
@@ -201,8 +201,8 @@ pub struct CriterionReport {
 }
 
 impl CriterionReport {
-    /// The result of the kind `R`, such as [`RestReport`](super::RestReport); `None` when it is of another
-    /// kind.
+    /// The result of the kind `R`, such as [`RestReport`](super::RestReport); `None` when it is of
+    /// another kind.
     pub fn report<R: Report>(&self) -> Option<&R> {
         self.report.downcast_ref()
     }

@@ -33,8 +33,8 @@ impl Moving {
     }
 }
 
-/// The inner nodes of the face tree by their height above the leaves, in the layout that [`refit`](crate::kernels::deform::refit)
-/// reads.
+/// The inner nodes of the face tree by their height above the leaves, in the layout that
+/// [`refit`](crate::kernels::deform::refit) reads.
 pub fn face_levels(children: &[[u32; 2]]) -> Vec<u32> {
     let mut heights = vec![0u32; children.len()];
     for node in (0..heights.len()).rev() {

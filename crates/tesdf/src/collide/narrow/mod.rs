@@ -3,7 +3,7 @@ mod branch_and_bound;
 mod exact;
 pub mod extremes;
 mod frank_wolfe;
-pub mod jump;
+mod jump;
 
 use glam::DVec3;
 
