@@ -17,7 +17,6 @@ pub mod benchmarks;
 pub mod detection;
 pub mod heading;
 pub mod on_grid;
-pub mod preset;
 pub mod reference;
 pub mod tables;
 pub mod voxel;

@@ -5,10 +5,10 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use tesdf::Length;
-use tesdf::collide::{CollideOptions, ContactsPer, Mode, Reduction};
-use tesdf::query::Precision;
+use tesdf::base::Named;
+use tesdf::collide::{CollideOptions, FaceOptions, ModeChoices, Reduction};
 
-use crate::errors::{argument, kind_of};
+use crate::errors::{Error, argument, kind_of};
 
 /// The keywords, in the order of the documentation.
 const NAMES: &str = "mode, contacts_per, contact_distance, speculative_time, cos_theta, iterations, tolerance, reduce, \
@@ -26,22 +26,26 @@ impl Keywords {
     ///
     /// # Errors
     /// `TypeError` for an unknown keyword; `ValueError` for a value of another type, an unknown
-    /// name, and keywords that exclude each other. The library checks ranges.
+    /// name, and keywords that exclude each other. `CollideError` for a keyword that the mode does
+    /// not use. The library checks ranges.
     pub fn new(function: &str, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut found = Self { options: CollideOptions::default(), threads: None };
         let mut reduction: Option<(String, Reduction)> = None;
+        let mut choices = ModeChoices::default();
         for (name, value) in keywords.into_iter().flatten() {
             let name: String = name.extract()?;
             let options = &mut found.options;
             match name.as_str() {
-                "mode" => options.mode = one_of(&name, &value, &MODES)?,
-                "contacts_per" => options.contacts_per = one_of(&name, &value, &CONTACTS_PER)?,
+                "mode" => choices.mode = Some(named(&name, &value)?),
+                "contacts_per" => choices.contacts_per = Some(named(&name, &value)?),
                 "contact_distance" => options.contact_distance = number(&name, &value)?,
                 "speculative_time" => options.speculative_time = number(&name, &value)?,
-                "cos_theta" => options.cos_theta = optional(&name, &value, number)?,
-                "iterations" => options.iterations = count(&name, &value)?,
-                "tolerance" => options.tolerance = tolerance(Some(&value), options.tolerance)?,
-                "precision" => options.precision = one_of(&name, &value, &PRECISIONS)?,
+                "cos_theta" => choices.cos_theta = optional(&name, &value, number)?,
+                "iterations" => choices.iterations = Some(count(&name, &value)?),
+                "tolerance" => {
+                    choices.tolerance = optional(&name, &value, number)?.map(Length::Absolute);
+                }
+                "precision" => options.precision = named(&name, &value)?,
                 "threads" => found.threads = optional(&name, &value, threads)?,
                 "reduce" | "spread" => {
                     let Some(kept) = optional(&name, &value, count)? else { continue };
@@ -61,18 +65,12 @@ impl Keywords {
                 }
             }
         }
+        let mode = choices.mode(FaceOptions::default());
+        found.options.mode = Python::attach(|py| mode.map_err(|e| Error::Collide(e).raise(py)))?;
         found.options.reduction = reduction.map_or(Reduction::None, |(_, kind)| kind);
         Ok(found)
     }
 }
-
-const MODES: [(&str, Mode); 3] = [("node", Mode::Node), ("face", Mode::Face), ("exact", Mode::Exact)];
-
-const CONTACTS_PER: [(&str, ContactsPer); 3] =
-    [("cell", ContactsPer::Cell), ("face", ContactsPer::Face), ("minimum", ContactsPer::Minimum)];
-
-/// The names of precisions.
-const PRECISIONS: [(&str, Precision); 2] = [("f64", Precision::F64), ("f32", Precision::F32)];
 
 /// Converts a length in the world's unit; None is `default`.
 pub fn tolerance(any: Option<&Bound<'_, PyAny>>, default: Length) -> PyResult<Length> {
@@ -82,19 +80,17 @@ pub fn tolerance(any: Option<&Bound<'_, PyAny>>, default: Length) -> PyResult<Le
     }
 }
 
-/// Converts one of the names of `choices`.
-pub fn one_of<T: Copy>(name: &str, any: &Bound<'_, PyAny>, choices: &[(&str, T)]) -> PyResult<T> {
-    let text = any.cast::<PyString>().map(|text| text.to_string()).ok();
-    if let Some((_, choice)) = choices.iter().find(|choice| Some(choice.0) == text.as_deref()) {
-        return Ok(*choice);
-    }
-    let found = text.map_or_else(|| kind_of(any), |text| format!("'{text}'"));
-    let quoted = |choices: &[(&str, T)]| {
-        let names: Vec<String> = choices.iter().map(|choice| format!("'{}'", choice.0)).collect();
-        names.join(", ")
+/// Converts the name of a choice.
+pub fn named<T: Named>(name: &str, any: &Bound<'_, PyAny>) -> PyResult<T> {
+    let text = any.cast::<PyString>().map(|text| text.to_string());
+    let found = match &text {
+        Ok(text) => match T::of_name(text) {
+            Some(value) => return Ok(value),
+            None => format!("'{text}'"),
+        },
+        Err(_) => kind_of(any),
     };
-    let (first, last) = choices.split_at(choices.len() - 1);
-    Err(argument(name, found, &format!("{} or {}", quoted(first), quoted(last))))
+    Err(argument(name, found, &T::names("'")))
 }
 
 fn number(name: &str, any: &Bound<'_, PyAny>) -> PyResult<f64> {

@@ -1,15 +1,12 @@
 //! `tesdf.encode`
-use std::num::{NonZeroU32, NonZeroUsize};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyString;
-use tesdf::base::SurfaceFaces;
-use tesdf::base::unit;
-use tesdf::encode::{
-    Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, RuleChoice,
-    Threshold,
-};
+use pyo3::types::{PyDict, PyString};
+use tesdf::base::{Named, unit};
+use tesdf::encode::{Deformation, Domain, DomainChoice, EncodeChoices, Encoder, Refinement, Threshold};
 use tesdf::mesh::RepairMode;
 use tesdf::{Progress, Stage};
 
@@ -67,56 +64,18 @@ use crate::pool;
 /// if the mesh has no well-defined inside. Raises EncodeError if an option does not apply to the
 /// mesh, options exclude each other, Gmsh fails, or the tetrahedra do not conform to the mesh.
 #[pyfunction]
-#[pyo3(signature = (
-    mesh, preset = "default", *, domain = None, encoder = None, resolution = None, threshold = None, e_max = None,
-    deformable = false, plain = false, band = None, regions = None, unit = None, inside = "winding", thickness = None,
-    surface = "all", repair = None, threads = None, progress = None
-))]
-#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+#[pyo3(
+    signature = (mesh, preset = "default", **options),
+    text_signature = "(mesh, preset='default', *, domain=None, encoder=None, resolution=None, threshold=None, e_max=None, deformable=False, plain=False, band=None, regions=None, unit=None, inside='winding', thickness=None, surface='all', repair=None, threads=None, progress=None)"
+)]
 pub fn encode(
     py: Python<'_>,
     mesh: &Bound<'_, PyAny>,
     preset: &str,
-    domain: Option<&Bound<'_, PyAny>>,
-    encoder: Option<&str>,
-    resolution: Option<u32>,
-    threshold: Option<&Bound<'_, PyAny>>,
-    e_max: Option<NonZeroU32>,
-    deformable: bool,
-    plain: bool,
-    band: Option<f64>,
-    regions: Option<Vec<[f64; 6]>>,
-    unit: Option<String>,
-    inside: &str,
-    thickness: Option<f64>,
-    surface: &str,
-    repair: Option<&str>,
-    threads: Option<NonZeroUsize>,
-    progress: Option<&Bound<'_, PyAny>>,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Asset> {
-    let choices = EncodeChoices {
-        preset: named_preset(preset)?,
-        domain: domain.map(domain_choice).transpose()?.unwrap_or_default(),
-        method: encoder.map(named_encoder).transpose()?,
-        resolution,
-        threshold: threshold.map(length_or_safe).transpose()?,
-        max_entries: e_max,
-        deformation: if deformable { Deformation::Expected } else { Deformation::None },
-        refinement: plain.then_some(Refinement::None),
-        band,
-        regions: regions.unwrap_or_default(),
-        unit,
-        rule: named_rule(inside)?,
-        thickness,
-        surface: named_surface(surface)?,
-    };
+    let Keywords { choices, repair, threads, progress } = Keywords::new(preset, options)?;
     let options = choices.options().map_err(|e| Error::Choice(e).raise(py))?;
-    let repair = match repair {
-        None => RepairMode::Never,
-        Some("auto") => RepairMode::Auto,
-        Some(other) => return Err(argument("repair", format!("'{other}'"), "'auto' or None")),
-    };
-
     let input = MeshInput::new(mesh)?;
     let pool = pool::of(threads).map_err(|e| e.raise(py))?;
     let state = Progress::default();
@@ -137,7 +96,7 @@ pub fn encode(
                 .map_err(|e| Error::Encode(path, e))
         })
     };
-    let watch = || match progress {
+    let watch = || match &progress {
         Some(progress) => {
             let (stage, share) = state.state();
             let stage = match stage {
@@ -157,39 +116,97 @@ pub fn encode(
     Ok(Asset::new(encoded))
 }
 
-fn named_rule(name: &str) -> PyResult<RuleChoice> {
-    let expected = "'winding', 'nonzero', 'odd', 'generalized' or 'sheet'";
-    name.parse().map_err(|_| argument("inside", format!("'{name}'"), expected))
+/// The keywords of `encode`, besides the mesh.
+#[derive(Default)]
+struct Keywords<'py> {
+    choices: EncodeChoices,
+    repair: RepairMode,
+    threads: Option<NonZeroUsize>,
+    progress: Option<Bound<'py, PyAny>>,
 }
 
-fn named_surface(name: &str) -> PyResult<SurfaceFaces> {
-    match name {
-        "all" => Ok(SurfaceFaces::All),
-        "boundary" => Ok(SurfaceFaces::Boundary),
-        _ => Err(argument("surface", format!("'{name}'"), "'all' or 'boundary'")),
+impl<'py> Keywords<'py> {
+    /// Converts the keywords. None stands for a keyword that is left out.
+    ///
+    /// # Errors
+    /// `TypeError` for an unknown keyword and a value of another type, `ValueError` for an unknown
+    /// name.
+    fn new(preset: &str, keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Self> {
+        let mut found = Self::default();
+        found.choices.preset = chosen("preset", preset)?;
+        for (name, value) in keywords.into_iter().flatten() {
+            let name: String = name.extract()?;
+            found.set(&name, &value)?;
+        }
+        Ok(found)
+    }
+
+    fn set(&mut self, name: &str, value: &Bound<'py, PyAny>) -> PyResult<()> {
+        let choices = &mut self.choices;
+        match name {
+            "domain" => {
+                choices.domain = given(value).map(domain_choice).transpose()?.unwrap_or_default();
+            }
+            "encoder" => choices.encoder = given(value).map(|any| named(name, any)).transpose()?,
+            "resolution" => choices.resolution = typed(name, value)?,
+            "threshold" => choices.threshold = given(value).map(length_or_safe).transpose()?,
+            "e_max" => choices.e_max = typed(name, value)?,
+            "deformable" => {
+                choices.deformation = match typed(name, value)? {
+                    true => Deformation::Expected,
+                    false => Deformation::None,
+                };
+            }
+            "plain" => choices.refinement = typed::<bool>(name, value)?.then_some(Refinement::None),
+            "band" => choices.band = typed(name, value)?,
+            "regions" => choices.regions = typed::<Option<_>>(name, value)?.unwrap_or_default(),
+            "unit" => choices.unit = typed(name, value)?,
+            "inside" => choices.inside = named(name, value)?,
+            "thickness" => choices.thickness = typed(name, value)?,
+            "surface" => choices.surface = named(name, value)?,
+            "repair" => self.repair = repair_mode(typed(name, value)?)?,
+            "threads" => self.threads = typed(name, value)?,
+            "progress" => self.progress = given(value).cloned(),
+            _ => {
+                let text = format!("encode() got an unexpected keyword argument '{name}'");
+                return Err(PyTypeError::new_err(text));
+            }
+        }
+        Ok(())
     }
 }
 
-fn named_preset(name: &str) -> PyResult<Preset> {
-    Ok(match name {
-        "default" => Preset::Default,
-        "fast" => Preset::Fast,
-        "compact" => Preset::Compact,
-        "gpu" => Preset::Gpu,
-        "paper" => Preset::Paper,
-        "sampled-safe" => Preset::SampledSafe,
-        _ => {
-            let expected = "'default', 'fast', 'compact', 'gpu', 'paper' or 'sampled-safe'";
-            return Err(argument("preset", format!("'{name}'"), expected));
+/// An object other than None.
+fn given<'a, 'py>(value: &'a Bound<'py, PyAny>) -> Option<&'a Bound<'py, PyAny>> {
+    Some(value).filter(|value| !value.is_none())
+}
+
+/// A value of a type. A `TypeError` names the keyword.
+fn typed<'a, 'py, T: FromPyObject<'a, 'py>>(name: &str, value: &'a Bound<'py, PyAny>) -> PyResult<T> {
+    value.extract().map_err(|e: T::Error| {
+        let e: PyErr = e.into();
+        match e.is_instance_of::<PyTypeError>(value.py()) {
+            true => PyTypeError::new_err(format!("argument '{name}': {}", e.value(value.py()))),
+            false => e,
         }
     })
 }
 
-fn named_encoder(name: &str) -> PyResult<MethodChoice> {
-    match name {
-        "certified" => Ok(MethodChoice::Certified),
-        "sampled" => Ok(MethodChoice::Sampled),
-        _ => Err(argument("encoder", format!("'{name}'"), "'certified' or 'sampled'")),
+/// The choice of a name.
+fn chosen<T: Named>(name: &str, text: &str) -> PyResult<T> {
+    T::of_name(text).ok_or_else(|| argument(name, format!("'{text}'"), &T::names("'")))
+}
+
+/// The choice of a name, which is a text.
+fn named<T: Named>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<T> {
+    chosen(name, &typed::<String>(name, value)?)
+}
+
+fn repair_mode(name: Option<String>) -> PyResult<RepairMode> {
+    match name.as_deref() {
+        None => Ok(RepairMode::Never),
+        Some("auto") => Ok(RepairMode::Auto),
+        Some(other) => Err(argument("repair", format!("'{other}'"), "'auto' or None")),
     }
 }
 

@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tesdf::base::unit::is_same_unit;
 use tesdf::collide::{
-    self, ClearanceOptions, CollideError, ContactsPer, Instance, InstanceId, Pose, Shape, ShapeId,
-    TimeOfImpactOptions, clearance, coarse_contacts, detect_until, time_of_impact, why,
+    self, ClearanceOptions, CollideError, Instance, InstanceId, Pose, Shape, ShapeId, TimeOfImpactOptions,
+    clearance, coarse_contacts, detect_until, time_of_impact, why,
 };
 
 use crate::arrays;
@@ -261,15 +261,15 @@ impl Scene {
     ///
     /// - mode: what is tested of a: "node" (its vertices), "face" (faces, by Frank-Wolfe
     ///   iterations, as in the paper) or "exact" (faces, with the exact minimum).
-    /// - contacts_per: in the modes "face" and "exact", one contact for each "cell" of b that a
+    /// - contacts_per: in the modes "face" and "exact" only, one contact for each "cell" of b that a
     ///   face meets, as in the paper; or for each "face", with the extremes of flat contact; or of
     ///   these only each local "minimum" over the surface.
     /// - contact_distance: contacts are reported up to this signed distance.
     /// - speculative_time: adds to the contact distance what the velocities close within this time.
-    /// - cos_theta: drops a contact of a face when the cosine between the gradient and the face's
-    ///   normal is above -cos_theta. None keeps all.
-    /// - iterations: number of Frank-Wolfe iterations in the mode "face".
-    /// - tolerance: largest error in the mode "exact", in the world's unit. None is 1e-7 of the
+    /// - cos_theta: in the modes "face" and "exact" only, drops a contact when the cosine between
+    ///   the gradient and the face's normal is above -cos_theta. None keeps all.
+    /// - iterations: number of Frank-Wolfe iterations in the mode "face" only.
+    /// - tolerance: largest error in the modes "face" and "exact" only, in the world's unit. None is 1e-7 of the
     ///   diagonal of b.
     /// - reduce, spread: at most this many contacts for each pair of instances; only one of them.
     ///   reduce finds all contacts and keeps those that matter most for forces and torques. spread
@@ -314,9 +314,10 @@ impl Scene {
     ///   of the scene, which poses do not change.
     /// - velocities: float32 [N, 6], vx vy vz wx wy wz, likewise; only with poses. None: at rest.
     /// - device: as in detect; None is that of poses if these are a DeviceArray, else "gpu".
-    /// - The other options are those of detect. contacts_per="minimum", and contacts per face
-    ///   without reduce, need the processor, and are DeviceErrors.
-    #[pyo3(signature = (*, poses = None, velocities = None, device = None, **options), text_signature = "($self, *, poses=None, velocities=None, device=None, mode='exact', contacts_per='cell', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
+    /// - The other options are those of detect, with the same defaults. A device cannot leave all
+    ///   contacts per face there: give reduce or spread, contacts_per="cell" or mode="node".
+    ///   Without, and with contacts_per="minimum", a DeviceError is raised.
+    #[pyo3(signature = (*, poses = None, velocities = None, device = None, **options), text_signature = "($self, *, poses=None, velocities=None, device=None, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn detect_on_device<'py>(
         &self,
         py: Python<'py>,
@@ -325,11 +326,7 @@ impl Scene {
         device: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let per_cell = !options.is_some_and(|given| given.contains("contacts_per").unwrap_or(false));
-        let Keywords { mut options, .. } = Keywords::new("detect_on_device", options)?;
-        if per_cell {
-            options.contacts_per = ContactsPer::Cell;
-        }
+        let Keywords { options, .. } = Keywords::new("detect_on_device", options)?;
         let device = match device {
             Some(_) => device::chosen(device)?
                 .ok_or_else(|| argument("device", "\"cpu\"", "a device other than the processor"))?,

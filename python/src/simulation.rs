@@ -20,7 +20,7 @@ use tesdf_sim::{
 };
 
 use crate::contacts::{self, Columns};
-use crate::detection::one_of;
+use crate::detection::named;
 use crate::device::{self, Device};
 use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::cancellable;
@@ -79,13 +79,6 @@ impl Source {
         }
     }
 }
-
-const MODES: [(&str, DetectorMode); 4] = [
-    ("node", DetectorMode::Node),
-    ("face", DetectorMode::Face),
-    ("exact", DetectorMode::Exact),
-    ("off", DetectorMode::Off),
-];
 
 impl Running {
     /// Reads the scene, encodes its meshes, and begins the run.
@@ -211,7 +204,7 @@ impl Simulation {
         device: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let device = device::chosen(device)?;
-        let mode = mode.map(|any| one_of("mode", any, &MODES)).transpose()?;
+        let mode: Option<DetectorMode> = mode.map(|any| named("mode", any)).transpose()?;
         let threads = threads.map(|n| pool::of(Some(n))).transpose().map_err(|e| e.raise(py))?;
         let pool = match &threads {
             Some(threads) => Arc::clone(threads),
@@ -223,7 +216,7 @@ impl Simulation {
             pool.install(|| {
                 let mut loaded = scene.read().map_err(Error::Scene)?;
                 let file = &mut loaded.scene;
-                file.detector.mode = mode.unwrap_or(file.detector.mode);
+                file.detector.choose(mode.unwrap_or(file.detector.name()));
                 file.time_step = time_step.unwrap_or(file.time_step);
                 file.duration = duration.unwrap_or(file.duration);
                 file.steps().map_err(|e| Error::Simulate(e.into()))?;

@@ -123,9 +123,7 @@ class Detector:
     def detect_on_device(self, poses: Any, velocities: Any, time_step: float) -> DeviceContacts:
         """Finds contacts where they stay, by arrays there: poses [N, 7], velocities [N, 6] of the shapes'
         own frames."""
-        options = {"contacts_per": "face", "speculative_time": _STEPS_AHEAD * time_step, **self._options}
-        if options["mode"] == "node":
-            options["contacts_per"] = "cell"
+        options = {"speculative_time": _STEPS_AHEAD * time_step, **self._options}
         found = self.scene.detect_on_device(poses=poses, velocities=velocities, **options)
         self.last, self.last_on_device, self._poses = None, found, poses
         return found

@@ -234,7 +234,7 @@ class Scene:
         velocities: Any = None,
         device: _Device = None,
         mode: Literal["node", "face", "exact"] = "exact",
-        contacts_per: Literal["cell", "face", "minimum"] = "cell",
+        contacts_per: Literal["cell", "face", "minimum"] = "face",
         contact_distance: float = 0.0,
         speculative_time: float = 0.0,
         cos_theta: float | None = None,

@@ -116,7 +116,8 @@ def test_measures_are_those_of_the_command(asset, file):
 @pytest.mark.parametrize("mode", ["node", "face", "exact"])
 def test_contacts_have_the_signed_distance_of_the_field(asset, torus, mode):
     # Body a is where its mesh is, so its field can be asked at points of the world.
-    found = tesdf.collide(asset, asset, pose_b=LINKED, mode=mode, contact_distance=0.03, tolerance=1e-9)
+    tolerance = {} if mode == "node" else {"tolerance": 1e-9}
+    found = tesdf.collide(asset, asset, pose_b=LINKED, mode=mode, contact_distance=0.03, **tolerance)
     of_field = found.instance_b == 0
     assert 3 < of_field.sum() < len(found)
     points = found.point_a[of_field]
@@ -305,6 +306,8 @@ def test_why_agrees_with_the_contacts(asset):
     ({"tolerance": 0}, tesdf.CollideError, "tolerance is 0"),
     ({"mode": "face", "iterations": 10**6}, tesdf.CollideError, "iterations is 1000000"),
     ({"iterations": -1}, ValueError, "iterations: -1; expected an integer from 0"),
+    ({"mode": "node", "contacts_per": "face"}, tesdf.CollideError, "contacts_per has no effect in the mode `node`"),
+    ({"iterations": 16}, tesdf.CollideError, "iterations has no effect in the mode `exact`, only in `face`"),
     ({"reduce": 0}, tesdf.CollideError, "reduction is 0 contacts per pair"),
     ({"reduce": 4, "spread": 4}, ValueError, "spread: given together with reduce; expected one of them"),
     ({"threads": 0}, ValueError, "threads: 0; expected an integer greater than 0"),

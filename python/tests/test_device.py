@@ -315,7 +315,7 @@ def test_arrays_of_poses_that_are_refused(linked, device):
     with pytest.raises(tesdf.DeviceError, match="instance 1: the arrays place it at .*NaN.*; expected finite numbers"):
         detect(poses=np.where(np.arange(14).reshape(2, 7) == 8, np.nan, poses))
     with pytest.raises(tesdf.DeviceError, match="leaving one contact of all faces at a vertex there is not available"):
-        linked.detect_on_device(mode="exact", contacts_per="face", device=device)
+        linked.detect_on_device(device=device)
     with pytest.raises(ValueError, match='device: "cpu"; expected a device other than the processor'):
         linked.detect_on_device(device="cpu")
 

@@ -5,7 +5,7 @@
 use std::error::Error;
 use std::sync::Arc;
 
-use tesdf::collide::{CollideOptions, Contact, Instance, InstanceId, Pose, Scene, detect};
+use tesdf::collide::{CollideOptions, Contact, Instance, InstanceId, Mode, Pose, Scene, detect};
 use tesdf::encode::{Encoder, Preset};
 use tesdf::geometry::Triangle;
 use tesdf::glam::{DVec2, DVec3};
@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let normal = |c: &Contact| Triangle::new(solids[0].mesh().triangle(c.face_a as usize)).normal;
     let cos = 0.5;
     let found = detect(&scene, &CollideOptions::default())?;
-    let kept = detect(&scene, &CollideOptions { cos_theta: Some(cos), ..CollideOptions::default() })?;
+    let kept = detect(&scene, &CollideOptions::with_mode(Mode::exact().filtered(cos)))?;
 
     // The deepest contact of each face and direction. Only the two lower faces are drawn.
     let mut shown: Vec<Contact> = Vec::new();

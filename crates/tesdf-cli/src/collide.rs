@@ -3,11 +3,11 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use clap::ValueEnum;
 use serde::Serialize;
 use tesdf::collide::{
-    CoarseContact, CollideOptions, Contact, Contacts, ContactsPer, HiddenOverlap, Instance, InstanceId, Mode,
-    PairReduction, Pose, Reduction, Scene, Statistics, TouchingFeatures, coarse_contacts, detect,
+    CoarseContact, CollideError, CollideOptions, Contact, Contacts, ContactsPer, FaceOptions, HiddenOverlap,
+    Instance, InstanceId, Mode, ModeChoices, ModeName, PairReduction, Pose, Reduction, Scene, Statistics,
+    TouchingFeatures, coarse_contacts, detect,
 };
 use tesdf::{Length, TeSdf};
 
@@ -53,17 +53,6 @@ impl Bodies {
     }
 }
 
-/// The features of one body that are tested against the distance field of the other.
-#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ModeName {
-    /// The vertices
-    Node,
-    /// The faces, by Frank-Wolfe iterations
-    Face,
-    /// The faces, with the exact minimum
-    Exact,
-}
-
 /// Arguments of `tesdf collide`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
@@ -71,23 +60,23 @@ pub struct Args {
     #[command(flatten)]
     pub bodies: Bodies,
     /// Features that are tested against the distance field of the other body
-    #[arg(long, value_enum, default_value_t = ModeName::Exact)]
+    #[arg(long, value_parser = parse::named::<ModeName>(), default_value_t = ModeName::Exact)]
     pub mode: ModeName,
     /// In the modes `face` and `exact`: one contact for each cell of the other body that a face
     /// meets; or for each face, with the extremes of flat contact; or of these, only the local
-    /// minima over the surface
-    #[arg(long, value_name = "cell|face|minimum", value_parser = parse::contacts_per, default_value = "face")]
-    pub contacts_per: ContactsPer,
+    /// minima over the surface [default: face]
+    #[arg(long, value_name = "cell|face|minimum")]
+    pub contacts_per: Option<ContactsPer>,
     /// Report contacts up to this signed distance, in the meshes' unit
     #[arg(long, value_name = "D", value_parser = parse::length, default_value_t = 0.0, allow_hyphen_values = true)]
     pub contact_distance: f64,
-    /// Drop a contact when the cosine between the face's normal and the field's gradient is below
+    /// In the modes `face` and `exact`: drop a contact when the cosine between the face's normal and the field's gradient is below
     /// this, or `off`
     #[arg(long, value_name = "C|off", value_parser = cosine, default_value = "off", allow_hyphen_values = true)]
     pub cos_theta: Cosine,
-    /// Number of Frank-Wolfe iterations in the mode `face`
-    #[arg(long, value_name = "K", default_value_t = 16)]
-    pub iterations: u32,
+    /// Number of Frank-Wolfe iterations in the mode `face` [default: 16]
+    #[arg(long, value_name = "K")]
+    pub iterations: Option<u32>,
     /// Maximum error in the mode `exact`, in the meshes' unit [default: 1e-7 of the
     /// diagonal of the body with the field]
     #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
@@ -165,23 +154,21 @@ fn reduction(text: &str) -> Result<Reduction, String> {
 }
 
 impl Args {
-    fn options(&self) -> CollideOptions {
-        let tolerance = self.tolerance.map_or(Length::OfDiagonal(1e-7), Length::Absolute);
-        let mode = match self.mode {
-            ModeName::Node => Mode::Node,
-            ModeName::Face => Mode::Face,
-            ModeName::Exact => Mode::Exact,
-        };
-        CollideOptions {
-            mode,
+    fn options(&self) -> Result<CollideOptions, CollideError> {
+        let choices = ModeChoices {
+            mode: Some(self.mode),
             contacts_per: self.contacts_per,
             iterations: self.iterations,
-            tolerance,
-            contact_distance: self.contact_distance,
+            tolerance: self.tolerance.map(Length::Absolute),
             cos_theta: self.cos_theta.0,
+        };
+        let options = CollideOptions {
+            contact_distance: self.contact_distance,
             reduction: self.spread.map_or(self.reduce, Reduction::Spread),
-            ..CollideOptions::default()
-        }
+            ..CollideOptions::with_mode(choices.mode(FaceOptions::default())?)
+        };
+        options.validate()?;
+        Ok(options)
     }
 }
 
@@ -190,8 +177,7 @@ impl Args {
 /// # Errors
 /// A file cannot be opened, an option is out of range, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let options = args.options();
-    options.validate().map_err(Failure::new)?;
+    let options = args.options().map_err(Failure::new)?;
     let (scene, ids) = args.bodies.scene()?;
     if let Some(part) = args.why {
         return why::run(&scene, ids, &options, part, args.json);
@@ -227,7 +213,7 @@ fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
     if !hidden.is_empty() {
         report::hint(match mode {
             Mode::Node => "the mode `node` only tests vertices: use --mode face or --mode exact",
-            Mode::Face | Mode::Exact => {
+            Mode::Face { .. } | Mode::Exact(_) => {
                 "their surfaces hardly enter each other, as when both bodies have the same pose: `tesdf clearance` measures the \
                  overlap; move the bodies apart"
             }

@@ -25,7 +25,7 @@ mod split;
 
 use crate::encode_all::Batch;
 use crate::encode_all::meshes::Mesh;
-pub use choices::{ChoiceArgs, EncoderChoice, Preset, RepairChoice};
+pub use choices::{ChoiceArgs, RepairChoice};
 use choices::{encode, solid};
 
 const ENCODED_HELP: &str = "Mesh file: STL, OBJ, PLY, OFF, glTF, GLB, 3MF, or STEP, IGES, BREP by the program Gmsh; or a \

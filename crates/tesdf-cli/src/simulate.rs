@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::Progress;
@@ -49,8 +48,8 @@ pub struct Args {
     #[arg(long, value_name = "SECONDS", value_parser = parse::length)]
     pub duration: Option<f64>,
     /// Detector mode in place of the scene's
-    #[arg(long, value_enum)]
-    pub mode: Option<Mode>,
+    #[arg(long, value_parser = parse::named::<DetectorMode>())]
+    pub mode: Option<DetectorMode>,
     /// Replace the geometry of a body by a .tesdf file, or by a mesh, which is encoded; `link*` are
     /// all bodies whose names begin with `link`; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
@@ -65,19 +64,6 @@ pub struct Args {
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
-}
-
-/// The features of one body that are tested against the distance field of the other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Mode {
-    /// The vertices
-    Node,
-    /// The faces, by Frank-Wolfe iterations
-    Face,
-    /// The faces, with the exact minimum
-    Exact,
-    /// Nothing: bodies pass through each other, and a criterion should fail
-    Off,
 }
 
 /// Parses a body and its geometry as `BODY=FILE`.
@@ -157,7 +143,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     drop(bar);
     let (record, summary) = ended.map_err(|e| recorder.failure(e, args.source()))?;
     recorder.finish(&record)?;
-    warn_of(&summary, loaded.scene.detector.mode);
+    warn_of(&summary, loaded.scene.detector.name());
     print(args, &summary)?;
     let is_refused = args.strict && !summary.warnings.is_empty();
     Ok(if is_refused || summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
@@ -212,12 +198,7 @@ fn load(args: &Args, earlier: Option<&InterruptedRun>) -> Result<LoadedScene, Fa
         scene.steps().map_err(|e| Failure::new(format!("{}: {e}", given.join(" "))))?;
     }
     if let Some(mode) = args.mode {
-        scene.detector.mode = match mode {
-            Mode::Node => DetectorMode::Node,
-            Mode::Face => DetectorMode::Face,
-            Mode::Exact => DetectorMode::Exact,
-            Mode::Off => DetectorMode::Off,
-        };
+        scene.detector.choose(mode);
     }
     replace_geometries(&mut loaded, &args.geometries, args.source())?;
     Ok(loaded)

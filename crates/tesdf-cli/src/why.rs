@@ -46,7 +46,7 @@ const SHOWN: usize = 10;
 fn text(r: &WhyReport, options: &CollideOptions) -> String {
     let noun = match options.mode {
         Mode::Node => "node",
-        Mode::Face | Mode::Exact => "face",
+        Mode::Face { .. } | Mode::Exact(_) => "face",
     };
     let mut text =
         format!("{noun}s of instance {} in the field of instance {}\n", r.instance_a, r.instance_b);

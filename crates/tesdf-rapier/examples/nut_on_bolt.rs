@@ -25,8 +25,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let step = argument(2, "1").parse::<f64>()? * 1e-3;
     let mode = match argument(3, "node").as_str() {
         "node" => Mode::Node,
-        "face" => Mode::Face,
-        "exact" => Mode::Exact,
+        "face" => Mode::face(),
+        "exact" => Mode::exact(),
         other => return Err(format!("{other}: expected node, face or exact").into()),
     };
     let contact_distance = argument(5, "0.2").parse::<f64>()? * 1e-3;

@@ -31,7 +31,7 @@
 //!
 //! let gravity = Vector::new(0.0, 0.0, -9.81);
 //! let mut world = PhysicsWorld { gravity, ..PhysicsWorld::default() };
-//! let dispatcher = query_dispatcher(CollideOptions::with_mode(Mode::Exact));
+//! let dispatcher = query_dispatcher(CollideOptions::with_mode(Mode::exact()));
 //! world.narrow_phase.set_query_dispatcher(dispatcher);
 //! world.integration_parameters = RapierOptions::default().parameters(1e-3, 1e-3); // s, m
 //! world.insert_collider(ColliderBuilder::new(SharedShape::new(HalfSpace::new(Vector::Z))), None);

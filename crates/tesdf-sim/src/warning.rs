@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::{CollideError, InstancePair, PenetrationOptions, deepest_penetration, instance_pairs};
 
 use crate::criterion::JointDrift;
-use crate::scene_file::{DetectorMode, SceneFile};
+use crate::scene_file::SceneFile;
 use crate::totals::Totals;
 use crate::{HiddenPair, Mass, Residual, System};
 
@@ -121,7 +121,7 @@ impl Watch {
             masses.fold((0.0, f64::INFINITY), |(m, least), (mass, size)| (m + mass, size.min(least)));
         let visible = 0.5 * mass * (VISIBLE * size / scene.time_step).powi(2);
         Self {
-            deep: (scene.detector.mode != DetectorMode::Off).then_some(scene.solver.deep),
+            deep: scene.detector.mode.map(|_| scene.solver.deep),
             joints: vec![Apart::default(); system.joints().len()],
             energy: Energy { visible, ..Energy::default() },
             sizes,

@@ -27,7 +27,8 @@ fn contacts(of: [&str; 2], at: DVec3, contact_distance: f64) -> Result<Vec<Conta
         scene.add(Instance::new(shape, Pose::at(at)))?;
     }
     let contacts_per = ContactsPer::Cell;
-    let options = CollideOptions { contact_distance, contacts_per, ..CollideOptions::with_mode(Mode::Face) };
+    let options =
+        CollideOptions { contact_distance, ..CollideOptions::with_mode(Mode::face().per(contacts_per)) };
     Ok(detect(&scene, &options)?.into_vec())
 }
 

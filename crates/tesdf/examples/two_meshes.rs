@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let bolt = scene.add(Instance::new(bolt, Pose::IDENTITY))?;
 
     let mut deepest = Vec::new();
-    for (name, mode) in [("node", Mode::Node), ("face", Mode::Face), ("exact", Mode::Exact)] {
+    for (name, mode) in [("node", Mode::Node), ("face", Mode::face()), ("exact", Mode::exact())] {
         let found = detect(&scene, &CollideOptions::with_mode(mode))?;
         let least = found.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
         println!("{name:<5} {} contacts, deepest {least:e} m, {:?}", found.len(), found.statistics);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use support::bodies::body;
 use tesdf::collide::{
-    CollideOptions, ContactsPer, Instance, Mode, Pose, Reduction, Scene, detect, reduce_pairs,
+    CollideOptions, ContactsPer, FaceOptions, Instance, Mode, Pose, Reduction, Scene, detect, reduce_pairs,
 };
 use tesdf::glam::DVec3;
 
@@ -50,9 +50,10 @@ fn the_reported_bytes_are_those_held() {
     }
     let all = CollideOptions {
         contact_distance: 0.3 * diagonal,
-        iterations: 1,
-        contacts_per: ContactsPer::Cell,
-        ..CollideOptions::with_mode(Mode::Face)
+        ..CollideOptions::with_mode(Mode::Face {
+            iterations: 1,
+            faces: FaceOptions { contacts_per: ContactsPer::Cell, ..FaceOptions::default() },
+        })
     };
     for n in [16, 1000] {
         let reduction = Reduction::PerPair(n);

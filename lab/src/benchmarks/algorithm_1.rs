@@ -96,8 +96,11 @@ fn row(args: &Args, input: &Input, name: DomainName) -> Result<(), Failure> {
     let domain = conforming.as_ref().map_or(Domain::Bisection, Domain::Conforming);
     let refinement = if conforming.is_some() { Refinement::None } else { Refinement::ByCost };
     let sampling = Sampling { resolution: args.resolution, ..Sampling::PAPER };
-    let options =
-        EncodeOptions { method: Method::Sampled(sampling), refinement, ..Preset::Default.options() };
+    let options = EncodeOptions {
+        method: Method::Sampled(sampling),
+        refinement,
+        ..EncodeOptions::preset(Preset::Default)
+    };
     let counter = SampleCounter::new(args.every, args.blocks);
     Encoder::new().options(options).domain(domain).sampler(&counter).encode(&input.solid)?;
     let counts = counter.counts();

@@ -3,6 +3,9 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Instant;
+use tesdf::base::Named as _;
+use tesdf::encode::EncodeOptions;
+use tesdf_cli::terminal::parse;
 
 use rayon::ThreadPoolBuilder;
 
@@ -16,7 +19,7 @@ pub struct Args {
     /// A mesh file; it is repaired first if necessary
     mesh: PathBuf,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Default)]
     preset: Preset,
     /// Number of threads [default: one per core]
     #[arg(long, value_name = "T")]
@@ -52,7 +55,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     )?;
     output::head(&COLUMNS, 2)?;
     let (asset, seconds) =
-        pool.install(|| input.encode(&args.preset.options()).map_err(|e| e.to_string()))?;
+        pool.install(|| input.encode(&EncodeOptions::preset(args.preset)).map_err(|e| e.to_string()))?;
     let peak = peak_resident_kib()?;
     output::row(&[
         input.name.clone(),

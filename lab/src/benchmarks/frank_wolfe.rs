@@ -2,9 +2,12 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use tesdf::base::Named as _;
+use tesdf::encode::EncodeOptions;
+use tesdf_cli::terminal::parse;
 
 use fastrand::Rng;
-use tesdf::collide::{CollideOptions, Contact, Instance, Mode, Pose, Scene, detect};
+use tesdf::collide::{CollideOptions, Contact, FaceOptions, Instance, Mode, Pose, Scene, detect};
 use tesdf::glam::{DQuat, DVec3};
 
 use super::input::{Input, Preset};
@@ -17,7 +20,7 @@ pub struct Args {
     #[arg(num_args = 2, required = true)]
     meshes: Vec<PathBuf>,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Default)]
     preset: Preset,
     /// Number of random poses of the second body
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
@@ -50,7 +53,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut scene = Scene::new();
     let mut ids = Vec::new();
     for input in &inputs {
-        let (asset, _) = input.encode(&args.preset.options())?;
+        let (asset, _) = input.encode(&EncodeOptions::preset(args.preset))?;
         let shape = scene.add_shape(Arc::new(asset))?;
         ids.push(scene.add(Instance::new(shape, Pose::IDENTITY))?);
     }
@@ -81,16 +84,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let turn = 0.01 * DVec3::new(signed(), signed(), signed()) / 3f64.sqrt();
         let pose = Pose::new(translation, DQuat::from_scaled_axis(turn))?;
         scene.set_poses(&[(ids[1], pose)])?;
-        let find = |mode, iterations| {
+        let find = |mode| {
             let contact_distance = args.contact_distance;
-            detect(
-                &scene,
-                &CollideOptions { contact_distance, iterations, ..CollideOptions::with_mode(mode) },
-            )
+            detect(&scene, &CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) })
         };
-        let exact = by_key(find(Mode::Exact, 0)?.as_slice());
+        let exact = by_key(find(Mode::exact())?.as_slice());
         for (k, &iterations) in ITERATIONS.iter().enumerate() {
-            let found = by_key(find(Mode::Face, iterations)?.as_slice());
+            let found = by_key(find(Mode::Face { iterations, faces: FaceOptions::default() })?.as_slice());
             for (key, least) in &exact {
                 let (of, beyond) = &mut errors[usize::from(*least < 0.0)][k];
                 match found.get(key) {

@@ -3,9 +3,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::Failure;
-pub use crate::preset::Preset;
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
+pub use tesdf::encode::Preset;
 use tesdf::encode::{EncodeOptions, Encoder};
 use tesdf::mesh::{RepairOptions, SolidMesh, repair};
 

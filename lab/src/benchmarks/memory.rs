@@ -1,11 +1,15 @@
 //! `tesdf-lab memory`: bytes and faces read per query, by preset.
 use std::path::PathBuf;
+use tesdf::base::Named as _;
+use tesdf::encode::EncodeOptions;
 
 use rayon::prelude::*;
 use tesdf::TeSdf;
 use tesdf::asset::CellKind;
 use tesdf::glam::DVec3;
 use tesdf::inspect::{InspectOptions, inspect};
+
+use tesdf_cli::terminal::parse;
 
 use super::input::{Input, Preset};
 use super::output::{mb, percent};
@@ -18,7 +22,7 @@ pub struct Args {
     #[arg(required = true)]
     meshes: Vec<PathBuf>,
     /// Presets of the encoder
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "default,fast,compact")]
+    #[arg(long, value_parser = parse::named::<Preset>(), value_delimiter = ',', default_value = "default,fast,compact")]
     presets: Vec<Preset>,
     /// Number of points near the surface, and of points in the domain
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
@@ -71,7 +75,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let mesh = input.solid.mesh();
         let near = points::near_surface(mesh, args.points as usize, args.seed);
         for preset in &args.presets {
-            let (asset, seconds) = input.encode(&preset.options())?;
+            let (asset, seconds) = input.encode(&EncodeOptions::preset(preset))?;
             let found = inspect(&asset, &InspectOptions { samples: 1, seed: args.seed });
             let domain = points::in_domain(&asset, args.points as usize, args.seed);
             let reach = points::NEAR * mesh.diagonal();

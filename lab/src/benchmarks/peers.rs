@@ -8,6 +8,8 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tesdf::encode::EncodeOptions;
+use tesdf_cli::terminal::parse;
 
 use parry3d::math::Pose as ParryPose;
 use rayon::ThreadPoolBuilder;
@@ -34,7 +36,7 @@ pub struct Args {
     #[arg(required = true)]
     sets: Vec<PathBuf>,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Default)]
     preset: Preset,
     /// Scale of parry3d's unit to the mesh's unit, because parry3d computes in f32 with absolute
     /// tolerances
@@ -123,7 +125,7 @@ struct Encoded {
 impl Encoded {
     fn new(path: &Path, args: &Args) -> Result<Self, Failure> {
         let input = Input::read(path)?;
-        let (asset, encode_seconds) = input.encode(&args.preset.options())?;
+        let (asset, encode_seconds) = input.encode(&EncodeOptions::preset(args.preset))?;
         let start = Instant::now();
         let mesh = input.solid.mesh();
         let vertices = mesh.vertices().iter().map(|&v| v * args.parry_scale).collect();
@@ -172,9 +174,8 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
         measure(set, |poses, contact_distance| {
             let options = CollideOptions {
                 contact_distance,
-                contacts_per,
                 reduction,
-                ..CollideOptions::with_mode(mode)
+                ..CollideOptions::with_mode(mode.per(contacts_per))
             };
             let found = detect(&scene(poses)?.0, &options)?;
             let least = found.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
@@ -194,12 +195,12 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
     Ok(vec![
         row("detect, nodes", "no: at vertices only", contacts(Mode::Node, Face, ALL)?),
         row("detect, nodes, 64 kept", "no: at vertices only", contacts(Mode::Node, Face, KEPT)?),
-        row("detect, Frank-Wolfe, per cell", "no: minima from above", contacts(Mode::Face, Cell, ALL)?),
-        row("detect, Frank-Wolfe, per face", "no: minima from above", contacts(Mode::Face, Face, ALL)?),
-        row("detect, exact, per cell", CERTIFIED, contacts(Mode::Exact, Cell, ALL)?),
-        row("detect, exact, per face", CERTIFIED, contacts(Mode::Exact, Face, ALL)?),
-        row("detect, exact, per face, 64 kept", CERTIFIED, contacts(Mode::Exact, Face, KEPT)?),
-        row("detect, exact, per face, 64 spread", SPREAD_ONLY, contacts(Mode::Exact, Face, SPREAD)?),
+        row("detect, Frank-Wolfe, per cell", "no: minima from above", contacts(Mode::face(), Cell, ALL)?),
+        row("detect, Frank-Wolfe, per face", "no: minima from above", contacts(Mode::face(), Face, ALL)?),
+        row("detect, exact, per cell", CERTIFIED, contacts(Mode::exact(), Cell, ALL)?),
+        row("detect, exact, per face", CERTIFIED, contacts(Mode::exact(), Face, ALL)?),
+        row("detect, exact, per face, 64 kept", CERTIFIED, contacts(Mode::exact(), Face, KEPT)?),
+        row("detect, exact, per face, 64 spread", SPREAD_ONLY, contacts(Mode::exact(), Face, SPREAD)?),
         row("clearance", CERTIFIED, apart),
     ])
 }

@@ -1,6 +1,9 @@
 //! `tesdf-lab query`: time of a query, against parry3d and a face tree.
 use std::hint::black_box;
 use std::path::PathBuf;
+use tesdf::base::Named as _;
+use tesdf::encode::EncodeOptions;
+use tesdf_cli::terminal::parse;
 
 use parry3d::math::Vector;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -21,7 +24,7 @@ pub struct Args {
     #[arg(required = true)]
     meshes: Vec<PathBuf>,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Default)]
     preset: Preset,
     /// Number of points of each kind per mesh
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
@@ -67,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let input = Input::read(path)?;
         let mesh = input.solid.mesh();
         let peer = Peer::new(mesh).map_err(|e| format!("{}: {e}", path.display()))?;
-        let (asset, _) = input.encode(&args.preset.options())?;
+        let (asset, _) = input.encode(&EncodeOptions::preset(args.preset))?;
         let reference = Reference::new(mesh);
         let count = args.points as usize;
         for (kind, points) in [

@@ -45,7 +45,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let input = Input::read(&args.mesh)?;
     let band = Some(Length::OfDiagonal(0.05));
     let domain = tetrahedralise(&input.solid, &GmshOptions { band, ..GmshOptions::default() })?;
-    let options = EncodeOptions { refinement: Refinement::None, ..Preset::Default.options() };
+    let options = EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Default) };
     let encode = || -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
         let asset = Encoder::new()

@@ -2,6 +2,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
+use tesdf::encode::EncodeOptions;
 
 use tesdf::collide::{CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, detect};
 use tesdf::glam::DVec3;
@@ -47,7 +48,7 @@ const CONTACT_DISTANCE: f64 = 5e-5;
 
 pub fn run(args: &Args) -> Result<(), Failure> {
     let load = |path| -> Result<Shape, Failure> {
-        Ok(Shape::Mesh(Arc::new(Input::read(path)?.encode(&Preset::Fast.options())?.0)))
+        Ok(Shape::Mesh(Arc::new(Input::read(path)?.encode(&EncodeOptions::preset(Preset::Fast))?.0)))
     };
     let (link, nut, bolt) = (load(&args.link)?, load(&args.nut)?, load(&args.bolt)?);
     heading::print()?;
@@ -56,7 +57,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
          its bolt in each world. Nodes and exact minima are measured; the time is that of the fastest repetition.\n",
     )?;
     output::head(&COLUMNS, 1)?;
-    let modes = [("node", Mode::Node), ("exact", Mode::Exact)];
+    let modes = [("node", Mode::Node), ("exact", Mode::exact())];
     for (name, mode) in modes {
         let options = CollideOptions::with_mode(mode);
         let scenes = ROWS.map(|n| (n, row(&link, n)));

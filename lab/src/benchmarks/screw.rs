@@ -2,7 +2,6 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use clap::ValueEnum;
 use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, CollideError, clearance};
 use tesdf_sim::criterion::{ScrewCriterion, ScrewReport};
@@ -10,6 +9,7 @@ use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Moment, Summary, System, simulate};
 
 use super::{Failure, heading, output};
+use tesdf_cli::terminal::parse;
 
 /// Arguments of `tesdf-lab screw`.
 #[derive(clap::Args)]
@@ -27,8 +27,8 @@ pub struct Args {
     #[arg(long, value_name = "MS", value_delimiter = ',', default_value = "1,3,5")]
     time_steps: Vec<f64>,
     /// Detector modes
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "node,face,exact")]
-    modes: Vec<Mode>,
+    #[arg(long, value_parser = parse::named::<DetectorMode>(), value_delimiter = ',', default_value = "node,face,exact")]
+    modes: Vec<DetectorMode>,
     /// Numbers of re-detections
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "0,1,2")]
     redetections: Vec<u32>,
@@ -38,15 +38,6 @@ pub struct Args {
     /// Number of measurements of the penetration during a run
     #[arg(long, value_name = "N", default_value_t = 10)]
     measurements: u64,
-}
-
-/// Detector modes, as in a scene file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Mode {
-    Node,
-    Face,
-    Exact,
-    Off,
 }
 
 const COLUMNS: [&str; 15] = [
@@ -99,18 +90,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }
         let system = loaded.system()?;
         for &mode in &args.modes {
-            loaded.scene.detector.mode = match mode {
-                Mode::Node => DetectorMode::Node,
-                Mode::Face => DetectorMode::Face,
-                Mode::Exact => DetectorMode::Exact,
-                Mode::Off => DetectorMode::Off,
-            };
+            loaded.scene.detector.choose(mode);
             for (&step, &redetections) in
                 args.time_steps.iter().flat_map(|step| args.redetections.iter().map(move |n| (step, n)))
             {
                 loaded.scene.time_step = step * 1e-3;
                 loaded.scene.solver.redetections = redetections;
-                let start = [name.clone(), step.to_string(), format!("{mode:?}").to_lowercase()];
+                let start = [name.clone(), step.to_string(), mode.to_string()];
                 let (summary, depth) = one(&loaded, system.clone(), args.measurements)?;
                 print(start.into_iter().chain([redetections.to_string()]), &summary, depth)?;
             }

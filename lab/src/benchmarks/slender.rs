@@ -3,6 +3,8 @@ use std::f64::consts::TAU;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Instant;
+use tesdf::base::Named as _;
+use tesdf_cli::terminal::parse;
 
 use rayon::ThreadPoolBuilder;
 use tesdf::encode::Encoder;
@@ -20,7 +22,7 @@ pub struct Args {
     /// The mesh file that times per face are compared with
     reference: PathBuf,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Fast)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Fast)]
     preset: Preset,
 }
 
@@ -89,7 +91,7 @@ fn one(name: &str, mesh: TriangleMesh, preset: Preset, unit: Option<f64>) -> Res
     let solid = SolidMesh::new(mesh)?;
     let checked = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let asset = Encoder::new().options(preset.options()).encode(&solid)?;
+    let asset = Encoder::new().preset(preset).encode(&solid)?;
     let seconds = start.elapsed().as_secs_f64();
     let ratio = seconds / faces as f64 / unit.unwrap_or(seconds / faces as f64);
     output::row(&[

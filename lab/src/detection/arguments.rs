@@ -3,11 +3,11 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use serde::Serialize;
-use tesdf::collide::{ContactsPer, Mode};
+use tesdf::collide::{CollideError, ContactsPer, Mode, ModeChoices, ModeName};
 use tesdf_cli::terminal::device::{self, Choice};
 use tesdf_cli::terminal::parse;
 
-use crate::preset::Preset;
+use tesdf::encode::Preset;
 
 /// Arguments of `tesdf-lab collide`.
 #[derive(clap::Args, Debug)]
@@ -19,25 +19,25 @@ pub struct Args {
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Best, help = device::help("contacts are found"))]
     pub device: Choice,
     /// Features that are tested against the distance field of the other body
-    #[arg(long, value_enum, default_value_t = ModeName::Face)]
+    #[arg(long, value_parser = parse::named::<ModeName>(), default_value_t = ModeName::Face)]
     pub mode: ModeName,
     /// In the modes `face` and `exact`: one contact for each cell of the other body that a face
     /// meets; or for each face, with the extremes of flat contact; or of these, only the local
-    /// minima over the surface
-    #[arg(long, value_name = "cell|face|minimum", value_parser = parse::contacts_per, default_value = "cell")]
-    pub contacts_per: ContactsPer,
-    /// Number of Frank-Wolfe iterations in the mode `face`
-    #[arg(long, value_name = "K", default_value_t = 16)]
-    pub iterations: u32,
-    /// Threshold of the cosine filter
-    #[arg(long, value_name = "C", value_parser = parse::number, default_value_t = 0.3, allow_hyphen_values = true)]
-    pub cos_theta: f64,
+    /// minima over the surface [default: cell]
+    #[arg(long, value_name = "cell|face|minimum")]
+    pub contacts_per: Option<ContactsPer>,
+    /// Number of Frank-Wolfe iterations in the mode `face` [default: 16]
+    #[arg(long, value_name = "K")]
+    pub iterations: Option<u32>,
+    /// Threshold of the cosine filter in the modes `face` and `exact` [default: 0.3]
+    #[arg(long, value_name = "C", value_parser = parse::number, allow_hyphen_values = true)]
+    pub cos_theta: Option<f64>,
     /// Contacts are detected up to this signed distance [default: the distance in the file,
     /// otherwise 0]
     #[arg(long, value_name = "D", value_parser = parse::length)]
     pub contact_distance: Option<f64>,
     /// Preset of the encoder for the meshes of a file of poses
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Default)]
     pub preset: Preset,
     /// Maximum list length of meshes that are encoded for a file of poses [default: not truncated]
     #[arg(long, value_name = "E")]
@@ -71,25 +71,20 @@ pub struct Args {
     pub json: bool,
 }
 
-/// The features that are tested.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ModeName {
-    /// The vertices
-    Node,
-    /// The faces, by Frank-Wolfe iterations
-    Face,
-    /// The faces, with the exact minimum
-    Exact,
-}
-
-impl From<ModeName> for Mode {
-    fn from(name: ModeName) -> Self {
-        match name {
-            ModeName::Node => Self::Node,
-            ModeName::Face => Self::Face,
-            ModeName::Exact => Self::Exact,
-        }
+impl Args {
+    /// The mode, by default with the options of the paper.
+    ///
+    /// # Errors
+    /// An option of another mode.
+    pub fn mode(&self) -> Result<Mode, CollideError> {
+        let choices = ModeChoices {
+            mode: Some(self.mode),
+            contacts_per: self.contacts_per,
+            iterations: self.iterations,
+            cos_theta: self.cos_theta,
+            ..ModeChoices::default()
+        };
+        choices.mode(Mode::PAPER.faces().copied().unwrap_or_default())
     }
 }
 

@@ -1,5 +1,6 @@
 //! `tesdf-lab collide SCENE|RUN|POSES`: the cost of a detection, stage by stage.
 use std::time::Instant;
+use tesdf::base::Named as _;
 
 use tesdf::EncodeOptions;
 use tesdf::collide::{CollideOptions, Reduction, detect};
@@ -16,29 +17,23 @@ use tesdf_cli::terminal::report::{self as output, Failure};
 /// A file cannot be read, or a device fails.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let device = args.device.open()?;
-    let options = EncodeOptions { max_entries: args.e_max, ..args.preset.options() };
+    let options = EncodeOptions { max_entries: args.e_max, ..EncodeOptions::preset(args.preset) };
     let mut frames = Frames::read(&args.source, args.frames, args.worlds, &options)?;
     let contact_distance = args.contact_distance.or(frames.contact_distance).unwrap_or(0.0);
     let options = CollideOptions {
         contact_distance,
-        contacts_per: args.contacts_per,
-        iterations: args.iterations,
-        cos_theta: Some(args.cos_theta),
         reduction: match (args.reduce, args.spread) {
             (Some(n), _) => Reduction::PerPair(n),
             (None, Some(k)) => Reduction::Spread(k),
             (None, None) => Reduction::None,
         },
-        ..CollideOptions::with_mode(args.mode.into())
+        ..CollideOptions::with_mode(args.mode().map_err(Failure::new)?)
     };
     options.validate().map_err(Failure::new)?;
     let mut report = Report {
         source: args.source.display().to_string(),
         device: "cpu".into(),
-        mode: args.mode,
-        contacts_per: args.contacts_per,
-        iterations: args.iterations,
-        cos_theta: args.cos_theta,
+        mode: options.mode.into(),
         contact_distance,
         preset: args.preset.name(),
         e_max: args.e_max,

@@ -1,11 +1,11 @@
 //! Measures a detection on a device, stage by stage.
 use std::time::{Duration, Instant};
 
-use tesdf::collide::{CollideOptions, Reduction};
-use tesdf_gpu::{Counting, Detector, DetectorOptions, Device, Exchange, Lanes, Memory, Pruning};
+use tesdf::collide::{CollideOptions, Mode, Reduction};
 use tesdf_cli::terminal::report::Failure;
+use tesdf_gpu::{Counting, Detector, DetectorOptions, Device, Exchange, Lanes, Memory, Pruning};
 
-use super::arguments::{Args, LanesName, ModeName};
+use super::arguments::{Args, LanesName};
 use super::frames::Frames;
 use super::hashes::Hashes;
 use super::report::{Bytes, Counts, PHASES, Report, Spread, Stage, ms};
@@ -59,7 +59,7 @@ pub fn fill(
     report.counts = measured.counts;
     report.contacts_hash = measured.contacts_hash;
     report.counts.queries_unpruned = Some(all.counts.queries);
-    let searches = args.mode != ModeName::Node;
+    let searches = options.mode != Mode::Node;
     report.counts.evaluations = operations.counts.evaluations.filter(|_| searches);
     report.counts.distances = operations.counts.distances.filter(|_| searches);
     report.stages = measured.stages;

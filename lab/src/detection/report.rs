@@ -3,10 +3,10 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use serde::Serialize;
-use tesdf::collide::ContactsPer;
+use tesdf::collide::ModeChoices;
 use tesdf_cli::terminal::report::size;
 
-use super::arguments::{LanesName, ModeName};
+use super::arguments::LanesName;
 
 /// Mean, median, 99th percentile and maximum of a series.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -74,10 +74,8 @@ pub struct Bytes {
 pub struct Report {
     pub source: String,
     pub device: String,
-    pub mode: ModeName,
-    pub contacts_per: ContactsPer,
-    pub iterations: u32,
-    pub cos_theta: f64,
+    #[serde(flatten)]
+    pub mode: ModeChoices,
     pub contact_distance: f64,
     /// Preset of the encoder for the meshes of a file of poses.
     pub preset: &'static str,

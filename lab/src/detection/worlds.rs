@@ -2,15 +2,16 @@
 //! does the same in Python.
 use std::path::PathBuf;
 use std::time::Instant;
+use tesdf_cli::terminal::parse;
 
 use rayon::ThreadPoolBuilder;
 use serde_json::json;
-use tesdf::collide::{CollideError, CollideOptions, Instance, InstanceId, Pose, Scene, detect};
+use tesdf::collide::{
+    CollideError, CollideOptions, FaceOptions, Instance, InstanceId, ModeName, Pose, Scene, detect,
+};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_cli::terminal::report::{self, Failure};
 use tesdf_cli::terminal::{asset_file, parse};
-
-use super::arguments::ModeName;
 
 /// Arguments of `tesdf-lab worlds`.
 #[derive(clap::Args, Debug)]
@@ -24,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pub poses: PathBuf,
     /// Features that are tested
-    #[arg(long, value_enum, default_value_t = ModeName::Node)]
+    #[arg(long, value_parser = parse::named::<ModeName>(), default_value_t = ModeName::Node)]
     pub mode: ModeName,
     /// Contacts are detected up to this signed distance
     #[arg(long, value_name = "D", value_parser = parse::length, default_value_t = 0.0)]
@@ -56,7 +57,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let moving = (ids.start.0 + worlds.end..).map(InstanceId);
     let placed: Vec<_> = moving.zip(poses).collect();
 
-    let mut options = CollideOptions::with_mode(args.mode.into());
+    let mut options = CollideOptions::with_mode(args.mode.with(FaceOptions::default()));
     options.contact_distance = args.contact_distance;
     let pool = ThreadPoolBuilder::new().num_threads(args.threads.into()).build();
     let pool = pool.map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;

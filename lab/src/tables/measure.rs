@@ -1,6 +1,7 @@
 //! Encodes a mesh with one set of options, and compares the asset with exact distances.
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
+use tesdf::base::Named as _;
 
 use serde::Serialize;
 use tesdf::encode::{Deformation, EncodeOptions, Encoder, Method, Refinement, Sampler, Sampling, Threshold};
@@ -10,7 +11,7 @@ use tesdf::{Progress, TeSdf};
 use super::domains::Subject;
 use super::output;
 use crate::on_grid::{self, BandReport};
-use crate::preset::Preset;
+use tesdf::encode::Preset;
 use tesdf_cli::terminal::progress::{Bar, watched};
 use tesdf_cli::terminal::report::Failure;
 
@@ -69,7 +70,7 @@ impl Setup {
         Self {
             encoder,
             domain,
-            options: EncodeOptions { method, refinement, deformation, ..preset.options() },
+            options: EncodeOptions { method, refinement, deformation, ..EncodeOptions::preset(preset) },
         }
     }
 

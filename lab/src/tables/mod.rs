@@ -21,12 +21,13 @@ mod table3;
 mod table4;
 
 use std::path::PathBuf;
+use tesdf_cli::terminal::parse;
 
 use crate::on_grid::MAX_FINENESS;
-use crate::preset::Preset;
 use meshes::{MESHES, Mesh};
 use output::Sink;
 use tesdf::domain::tetrahedra_files;
+use tesdf::encode::Preset;
 
 use tesdf_cli::terminal::device::{self, Choice};
 use tesdf_cli::terminal::output::Consent;
@@ -61,7 +62,7 @@ pub struct TableArgs {
     #[arg(long, value_enum, value_delimiter = ',', default_value = "bisection")]
     pub domain: Vec<DomainName>,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Default)]
     pub preset: Preset,
     /// Number of grid points along the diagonal of a mesh [default: 1024; with --quick 64]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FINENESS)))]

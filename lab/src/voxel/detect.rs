@@ -155,9 +155,13 @@ impl Ordered<'_> {
             contacts.sort_by_key(|c| (c.face_a, c.feature.a));
             return Found { contacts, candidates: points.len(), filtered: 0 };
         }
+        let iterations = match options.mode {
+            Mode::Face { iterations, .. } => iterations,
+            Mode::Node | Mode::Exact(_) => Mode::ITERATIONS,
+        };
         let face = |k: usize| {
             let corners = arrays.faces[k].map(|v| points[v as usize]);
-            let (point, value) = lowest(self.b.grid, corners, options.iterations, reach)?;
+            let (point, value) = lowest(self.b.grid, corners, iterations, reach)?;
             let id = arrays.face_ids[k];
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
             let cosine = unit(value.gradient).dot(normal);
@@ -168,7 +172,7 @@ impl Ordered<'_> {
         let candidates = found.len();
         let (mut kept, mut filtered) = (Vec::new(), 0);
         for found in found {
-            match options.cos_theta {
+            match options.mode.faces().and_then(|faces| faces.cos_theta) {
                 Some(cos) if found.cosine > -cos => filtered += 1,
                 _ => kept.push(found),
             }

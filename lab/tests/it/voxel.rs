@@ -247,7 +247,7 @@ fn nodes_have_the_contacts_of_direct_evaluation() {
 #[test]
 fn faces_are_as_low_as_their_corners_and_centres() {
     let (scene, detector, grids) = peg_in_hole(64);
-    let contacts = found(&scene, &detector, Mode::Face);
+    let contacts = found(&scene, &detector, Mode::face());
     for (a, b) in [(0, 1), (1, 0)] {
         let ((asset, at_a), (_, at_b)) = (mesh(&scene, a), mesh(&scene, b));
         let found = of_pair(&contacts, a, b);
@@ -304,7 +304,7 @@ fn fine_grids_have_nearly_exact_contacts() {
 #[test]
 fn contacts_do_not_depend_on_the_number_of_threads() {
     let (scene, detector, _) = peg_in_hole(64);
-    for mode in [Mode::Node, Mode::Face] {
+    for mode in [Mode::Node, Mode::face()] {
         let all = found(&scene, &detector, mode);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         assert_eq!(pool.install(|| found(&scene, &detector, mode)), all);

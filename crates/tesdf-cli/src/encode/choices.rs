@@ -7,7 +7,8 @@ use crate::terminal::report::Failure;
 use clap::ValueEnum;
 use tesdf::base::{Inside, SurfaceFaces};
 use tesdf::encode::{
-    Deformation, Domain, DomainChoice, EncodeChoices, Encoder, Refinement, RuleChoice, Threshold,
+    Deformation, Domain, DomainChoice, EncodeChoices, Encoder, EncoderChoice, InsideChoice, Preset,
+    Refinement, Threshold,
 };
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{AutoRepaired, NotSolid, SolidMesh, TriangleMesh};
@@ -23,10 +24,10 @@ pub struct ChoiceArgs {
     pub domain: DomainChoice,
     /// Method that finds the closest faces of each tetrahedron [default: certified, or the
     /// preset's]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = parse::named::<EncoderChoice>())]
     pub encoder: Option<EncoderChoice>,
     /// Trade-off between memory, query speed and encoding time
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Default)]
     pub preset: Preset,
     /// Resolution Q of the sampled encoder: an edge of a tetrahedron has Q + 1 samples [default:
     /// 32]
@@ -57,65 +58,19 @@ pub struct ChoiceArgs {
     #[arg(long, value_name = "NAME")]
     pub unit: Option<String>,
     /// Rule that says what is inside
-    #[arg(long, value_enum, value_name = "RULE", default_value_t = Rule::Winding)]
-    pub inside: Rule,
+    #[arg(long, value_name = "RULE", value_parser = parse::named::<InsideChoice>(), default_value_t = InsideChoice::Winding)]
+    pub inside: InsideChoice,
     /// Thickness of a sheet, in the mesh's unit
     #[arg(long, value_name = "LENGTH", value_parser = parse::length)]
     pub thickness: Option<f64>,
     /// Faces to which distances refer
-    #[arg(long, value_enum, value_name = "FACES", default_value_t = SurfaceChoice::All)]
-    pub surface: SurfaceChoice,
+    #[arg(long, value_name = "FACES", value_parser = parse::named::<SurfaceFaces>(), default_value_t = SurfaceFaces::All)]
+    pub surface: SurfaceFaces,
     /// Repair a mesh without a well-defined inside as `tesdf repair --auto` does, before it is
     /// encoded; what was changed is printed and recorded in the file [default: such a mesh is
     /// refused]
     #[arg(long, value_enum)]
     pub repair: Option<RepairChoice>,
-}
-
-/// Rules that say what is inside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Rule {
-    /// A winding number of 1 or more; the mesh must be closed
-    Winding,
-    /// A winding number other than 0: takes shells that are inside out; the mesh must be closed
-    Nonzero,
-    /// An odd winding number: overlaps of two solids are outside; the mesh must be closed
-    Odd,
-    /// A generalised winding number of 1/2 or more in absolute value; for open meshes, whose
-    /// distance jumps in the holes
-    Generalized,
-    /// Nearer to a face than half of a thickness; for sheets, and any other faces
-    Sheet,
-}
-
-/// Faces to which distances refer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SurfaceChoice {
-    /// All faces
-    All,
-    /// Faces between inside and outside; faces within the solid are left out
-    Boundary,
-}
-
-impl From<Rule> for RuleChoice {
-    fn from(rule: Rule) -> Self {
-        match rule {
-            Rule::Winding => Self::Winding,
-            Rule::Nonzero => Self::Nonzero,
-            Rule::Odd => Self::Odd,
-            Rule::Generalized => Self::Generalized,
-            Rule::Sheet => Self::Sheet,
-        }
-    }
-}
-
-impl From<SurfaceChoice> for SurfaceFaces {
-    fn from(choice: SurfaceChoice) -> Self {
-        match choice {
-            SurfaceChoice::All => Self::All,
-            SurfaceChoice::Boundary => Self::Boundary,
-        }
-    }
 }
 
 /// Repairs before encoding.
@@ -126,74 +81,25 @@ pub enum RepairChoice {
     Auto,
 }
 
-/// Methods that find the closest faces of a tetrahedron.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum EncoderChoice {
-    /// Proven: no face that can be closest is missing
-    Certified,
-    /// Faces that are closest at samples, as in the paper; faces that are closest only between
-    /// samples may be missing
-    Sampled,
-}
-
-/// Trade-offs between memory, query speed and encoding time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Preset {
-    /// Fast queries
-    Default,
-    /// Fast encoding
-    Fast,
-    /// Small files
-    Compact,
-    /// Few cells, whose lists fill the 32 threads of a GPU that read them; for detection on a GPU
-    Gpu,
-    /// The paper's encoder: sampled, 129 samples along an edge, tetrahedra not bisected
-    Paper,
-    /// Sampled with a threshold that is large enough that no needed face is missing
-    SampledSafe,
-}
-
-impl From<EncoderChoice> for tesdf::encode::MethodChoice {
-    fn from(choice: EncoderChoice) -> Self {
-        match choice {
-            EncoderChoice::Certified => Self::Certified,
-            EncoderChoice::Sampled => Self::Sampled,
-        }
-    }
-}
-
-impl From<Preset> for tesdf::encode::Preset {
-    fn from(preset: Preset) -> Self {
-        match preset {
-            Preset::Default => Self::Default,
-            Preset::Fast => Self::Fast,
-            Preset::Compact => Self::Compact,
-            Preset::Gpu => Self::Gpu,
-            Preset::Paper => Self::Paper,
-            Preset::SampledSafe => Self::SampledSafe,
-        }
-    }
-}
-
 impl ChoiceArgs {
     /// The options for the library.
     pub fn choices(&self) -> EncodeChoices {
         let numbers = |r: &Aabb| [r.min.x, r.min.y, r.min.z, r.max.x, r.max.y, r.max.z];
         EncodeChoices {
-            preset: self.preset.into(),
+            preset: self.preset,
             domain: self.domain.clone(),
-            method: self.encoder.map(Into::into),
+            encoder: self.encoder,
             resolution: self.resolution,
             threshold: self.threshold,
-            max_entries: self.e_max,
+            e_max: self.e_max,
             deformation: if self.deformable { Deformation::Expected } else { Deformation::None },
             refinement: self.plain.then_some(Refinement::None),
             band: self.band,
             regions: self.regions.iter().map(numbers).collect(),
             unit: self.unit.clone(),
-            rule: self.inside.into(),
+            inside: self.inside,
             thickness: self.thickness,
-            surface: self.surface.into(),
+            surface: self.surface,
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Parsers for the values of options.
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tesdf::Length;
-use tesdf::collide::{ContactsPer, Motion, Pose, Velocity};
+use tesdf::base::Named;
+use tesdf::collide::{Motion, Pose, Velocity};
 use tesdf::geometry::Aabb;
 use tesdf::glam::{DQuat, DVec3};
 
@@ -69,17 +71,11 @@ pub fn words(text: &str) -> Vec<&str> {
     text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect()
 }
 
-/// Parses what a contact of a face stands for.
-///
-/// # Errors
-/// The message says what was found.
-pub fn contacts_per(text: &str) -> Result<ContactsPer, String> {
-    match text {
-        "cell" => Ok(ContactsPer::Cell),
-        "face" => Ok(ContactsPer::Face),
-        "minimum" => Ok(ContactsPer::Minimum),
-        _ => Err("expected cell, face or minimum".into()),
-    }
+/// Parses a choice by its name. The help lists all names with their meanings.
+pub fn named<T: Named>() -> impl TypedValueParser<Value = T> {
+    let values = T::ALL.iter().map(|value| PossibleValue::new(value.name()).help(value.meaning()));
+    // Only the names of `T` come here.
+    PossibleValuesParser::new(values).try_map(|name| T::of_name(&name).ok_or_else(|| T::names("")))
 }
 
 /// Parses a number from 0 to 1.

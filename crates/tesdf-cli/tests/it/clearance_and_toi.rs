@@ -129,9 +129,8 @@ fn a_hidden_overlap_is_reported() {
 #[test]
 fn contacts_per_face_are_the_corners_of_a_cube_on_a_cube() {
     let folder = cube();
-    let on_top =
-        ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0 0 2 0 0 0 1", "--cos-theta", "0.5", "--json"];
-    let found = json(&folder, &[&on_top[..], &["--contacts-per", "face"]].concat());
+    let on_top = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0 0 2 0 0 0 1", "--json"];
+    let found = json(&folder, &[&on_top[..], &["--contacts-per", "face", "--cos-theta", "0.5"]].concat());
     let faces = found.as_array().unwrap();
     for [x, y] in [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]] {
         let is_here = |c: &Value| c["point_a"][0] == x && c["point_a"][1] == y;
@@ -145,6 +144,16 @@ fn contacts_per_face_are_the_corners_of_a_cube_on_a_cube() {
     assert!(error.contains("hint: use --mode exact --contacts-per face"), "{error}");
     let (code, _, error) = folder.tesdf(&[&on_top[..], &["--contacts-per", "body"]].concat());
     assert!(code == Some(2) && error.contains("expected cell, face or minimum"), "{error}");
+    for (mode, option, value, modes) in [
+        ("node", "--contacts-per", "face", "`face` and `exact`"),
+        ("node", "--tolerance", "1e-3", "`face` and `exact`"),
+        ("node", "--cos-theta", "0.5", "`face` and `exact`"),
+        ("exact", "--iterations", "16", "`face`"),
+    ] {
+        let (code, _, error) = folder.tesdf(&[&on_top[..], &["--mode", mode, option, value]].concat());
+        let expected = format!("has no effect in the mode `{mode}`, only in {modes}");
+        assert!(code == Some(2) && error.contains(&expected), "{error}");
+    }
 }
 
 #[test]

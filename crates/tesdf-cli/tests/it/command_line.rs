@@ -1,12 +1,12 @@
 //! The binary's exit codes, streams and messages.
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use clap::{CommandFactory, Parser};
 use tesdf::encode::{
-    ChoiceError, Deformation, DomainChoice, EncodeOptions, Method, Refinement, Sampling, Threshold,
+    ChoiceError, Deformation, DomainChoice, EncodeOptions, Method, Preset, Refinement, Sampling, Threshold,
 };
-use tesdf_cli::{Cli, Command as Parsed, encode, slice};
+use tesdf_cli::{Cli, Command as Parsed, slice};
 
 fn tesdf(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_tesdf")).args(args).output().unwrap()
@@ -96,7 +96,7 @@ fn negative_numbers_are_values_and_not_options() {
     };
     assert_eq!(args.choices.regions.len(), 2);
     assert_eq!(args.choices.regions[0].min.to_array(), [-1.0, -2.0, -3.0]);
-    assert_eq!((args.choices.band, args.choices.preset), (Some(0.0), encode::Preset::Compact));
+    assert_eq!((args.choices.band, args.choices.preset), (Some(0.0), Preset::Compact));
     let Parsed::Slice(args) =
         parse(&["slice", "a/b.tesdf", "-o", "p.png", "--axis", "x", "--offset", "-2.5e-1"]).unwrap()
     else {
@@ -115,7 +115,7 @@ fn defaults_are_the_documented_ones() {
     let Parsed::Encode(args) = parse(&["encode", "m", "-o", "f"]).unwrap() else { panic!() };
     assert_eq!(
         (&args.choices.domain, args.choices.encoder, args.choices.preset),
-        (&DomainChoice::Bisection, None, encode::Preset::Default)
+        (&DomainChoice::Bisection, None, Preset::Default)
     );
     assert_eq!(args.choices.choices().options().unwrap(), EncodeOptions::default());
 }
@@ -173,4 +173,44 @@ fn completions_are_printed_and_a_closed_pipe_is_no_error() {
     drop(child.stdout.take());
     let out = child.wait_with_output().unwrap();
     assert_eq!((out.status.code(), text(&out.stderr)), (Some(0), ""));
+}
+
+/// The parts of a text between `` ` ``.
+fn code(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}
+
+#[test]
+fn the_table_of_names_has_names_that_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let read = |path: &str| std::fs::read_to_string(root.join(path)).expect("a file of the repository");
+    let glossary = read("docs/glossary.md");
+    let python =
+        ["_native.pyi", "bodies.py", "contacts.py"].map(|file| read(&format!("python/tesdf/{file}")));
+    let (python, scene) = (python.concat(), read("docs/scene-file.md"));
+    let mut command = Cli::command();
+    command.build();
+    let commands: Vec<_> = command.get_subcommands().collect();
+    let is_flag = |name: &str| {
+        let has = |c: &&clap::Command| c.get_arguments().any(|arg| arg.get_long() == Some(name));
+        commands.iter().any(has)
+    };
+    let rows = glossary.split("\n## ").find(|part| part.starts_with("Names")).expect("the table");
+    let rows: Vec<Vec<&str>> =
+        rows.lines().filter(|l| l.starts_with("| ")).skip(1).map(|l| l.split('|').collect()).collect();
+    assert!(rows.len() > 20, "{rows:?}");
+    for row in rows {
+        let [_, thing, _, in_python, in_tool, in_scene, ..] = row[..] else { panic!("{row:?}") };
+        for name in code(in_python) {
+            let is_there = ["(", ":", " "].iter().any(|end| python.contains(&format!(" {name}{end}")));
+            assert!(is_there, "{thing}: Python has no {name}");
+        }
+        for name in code(in_tool).filter(|name| name.starts_with("--")) {
+            assert!(is_flag(&name[2..]), "{thing}: no command has {name}");
+        }
+        for name in code(in_scene) {
+            let is_there = scene.contains(&format!("|`{name}`|")) || scene.contains(&format!("`[{name}]`"));
+            assert!(is_there, "{thing}: scene files have no {name}");
+        }
+    }
 }

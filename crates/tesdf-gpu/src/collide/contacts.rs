@@ -142,7 +142,7 @@ pub fn one_per_vertex(shapes: &[&Shape], instances: &Instances, words: &mut Vec<
         let shape = shapes[instances.shapes[words.a as usize]];
         let vertex = vertex(shape, words)?;
         let cosine = (f64::from(row.cosine) / COSINE_TIE).round() as i64;
-        let face = surface_names(shape, Mode::Exact, words).0;
+        let face = surface_names(shape, Mode::exact(), words).0;
         Some(((words.a, words.b, vertex), cosine, face, at))
     };
     let keys = words.iter().zip(&*rows).enumerate().filter_map(key).collect();
@@ -205,12 +205,12 @@ fn surface_names(shape: &Shape, mode: Mode, words: &Words) -> (u32, u32) {
             let node = simple.nodes().iter().position(|&(p, _)| p == point).unwrap_or(0);
             (part, node as u32)
         }
-        (Mode::Face | Mode::Exact, Shape::Mesh(asset)) => {
+        (Mode::Face { .. } | Mode::Exact(_), Shape::Mesh(asset)) => {
             let face = asset.face_id(part as usize);
             (face, face)
         }
-        (Mode::Face | Mode::Exact, Shape::Plane) => (0, 0),
-        (Mode::Face | Mode::Exact, _) => (part, part),
+        (Mode::Face { .. } | Mode::Exact(_), Shape::Plane) => (0, 0),
+        (Mode::Face { .. } | Mode::Exact(_), _) => (part, part),
     }
 }
 

@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use tesdf::Length;
 use tesdf::collide::internal::in_cones;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, InstancePair, Mode, Reduction, Scene,
+    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, InstancePair, Reduction, Scene,
     Shape, ShapeId, Statistics, reduce_pairs,
 };
 
@@ -340,7 +340,9 @@ impl Detector {
             one_per_vertex(&shapes, instances, &mut words, &mut rows);
         }
         let (mut contacts, faces) = contacts(&shapes, instances, options.mode, &words, &rows);
-        if self.has_cones(options) {
+        if self.has_cones(options)
+            && let Some(options) = options.mode.faces()
+        {
             let all = contacts.len();
             contacts = in_cones(scene, options, &contacts, &faces)?;
             filtered += all - contacts.len();
@@ -423,7 +425,7 @@ fn possible(options: &CollideOptions) -> Result<CollideOptions, GpuError> {
 
 /// Whether contacts that are no local minima are dropped, which the processor does.
 fn wants_minima(options: &CollideOptions) -> bool {
-    options.contacts_per == ContactsPer::Minimum && options.mode != Mode::Node
+    options.mode.contacts_per() == Some(ContactsPer::Minimum)
 }
 
 /// The shapes of all instances, sorted and without duplicates.

@@ -1,5 +1,5 @@
 //! Narrow phase: Node-TES, Face-TES or the exact minimum.
-use tesdf::collide::Mode;
+use tesdf::collide::{FaceOptions, Mode};
 
 use super::pass::{GROUP, Parts, Pass, parts};
 use super::stages::launch;
@@ -17,8 +17,8 @@ impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
         match self.options.mode {
             Mode::Node => self.narrow_nodes(),
-            Mode::Face => self.narrow_faces(),
-            Mode::Exact => self.narrow_exact(),
+            Mode::Face { iterations, .. } => self.narrow_faces(iterations),
+            Mode::Exact(_) => self.narrow_exact(),
         }
     }
 
@@ -51,20 +51,25 @@ impl Pass<'_> {
         )
     }
 
+    /// The options of the faces; nodes have none, and use none.
+    fn face_options(&self) -> FaceOptions {
+        self.options.mode.faces().copied().unwrap_or_default()
+    }
+
     /// Threshold of the cosine filter. Without the filter it is −2, which keeps every contact.
     fn cos_theta(&self) -> f32 {
-        self.options.cos_theta.map_or(-2.0, |cos| cos as f32)
+        self.face_options().cos_theta.map_or(-2.0, |cos| cos as f32)
     }
 
     /// The tolerances of all instances on the device, at least `least`.
     fn tolerances(&mut self, least: f64) -> Result<Buffer, GpuError> {
-        let tolerances = self.detector.tolerances(self.instances, self.options.tolerance, least);
+        let tolerances = self.detector.tolerances(self.instances, self.face_options().tolerance, least);
         let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
         self.sent += tolerances.bytes();
         Ok(tolerances)
     }
 
-    fn narrow_faces(&mut self) -> Result<(), GpuError> {
+    fn narrow_faces(&mut self, iterations: u32) -> Result<(), GpuError> {
         let (shapes, buffers, with) = (&self.detector.shapes, &self.detector.buffers, &self.detector.options);
         let whole = parts(self.options) == Parts::Faces;
         let (per, lanes) = match with.lanes {
@@ -80,7 +85,7 @@ impl Pass<'_> {
         let per_polygon = self.groups_for(buffers.room.polygons, per, POLYGONS)?;
         let tolerances = self.tolerances(FINEST)?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
-        let asked = AskedLaunch::new(tolerances.words(), self.options.iterations, self.cos_theta());
+        let asked = AskedLaunch::new(tolerances.words(), iterations, self.cos_theta());
         if whole {
             let faces = buffers.whole_faces();
             return launch!(

@@ -79,7 +79,8 @@ impl Detector {
     /// - [`GpuError::Length`] when an array does not have a row for each instance;
     /// - [`GpuError::Instance`] for a pose that is none, or a velocity that is not finite;
     /// - [`GpuError::Unavailable`] for what only the processor does: contacts per minimum, and
-    ///   one contact of all faces at a vertex.
+    ///   one contact of all faces at a vertex. So contacts per face, which are the default, must be
+    ///   reduced.
     pub fn detect_on_device(
         &mut self,
         scene: &Scene,

@@ -1,6 +1,6 @@
 //! One pass: the launches of all stages.
 use cubecl::prelude::*;
-use tesdf::collide::{CollideOptions, ContactsPer, Mode};
+use tesdf::collide::{CollideOptions, ContactsPer};
 
 use super::buffers::{ROW, WORD};
 use super::counts::Counts;
@@ -30,10 +30,10 @@ pub enum Parts {
 
 /// The parts of a surface that a detection takes.
 pub fn parts(options: &CollideOptions) -> Parts {
-    match (options.mode, options.contacts_per) {
-        (Mode::Node, _) => Parts::Nodes,
-        (Mode::Face | Mode::Exact, ContactsPer::Cell) => Parts::Polygons,
-        (Mode::Face | Mode::Exact, ContactsPer::Face | ContactsPer::Minimum) => Parts::Faces,
+    match options.mode.contacts_per() {
+        None => Parts::Nodes,
+        Some(ContactsPer::Cell) => Parts::Polygons,
+        Some(ContactsPer::Face | ContactsPer::Minimum) => Parts::Faces,
     }
 }
 

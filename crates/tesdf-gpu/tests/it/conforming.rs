@@ -120,7 +120,7 @@ fn a_pass_takes_the_documented_number_of_launches() {
             let shape = scene.add_shape(shape).expect("a shape");
             scene.add(Instance::new(shape, Pose::IDENTITY)).expect("an instance");
         }
-        for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+        for mode in [Mode::Node, Mode::face(), Mode::exact()] {
             for (reduction, of_reduction) in [(Reduction::None, 0), (Reduction::PerPair(2), 7)] {
                 let options = CollideOptions { reduction, ..per_cell(mode) };
                 let (_, detector) = found(&scene, &options, DetectorOptions::default());

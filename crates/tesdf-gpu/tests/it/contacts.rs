@@ -66,8 +66,8 @@ fn a_nut_on_its_bolt() {
     let bolt = Placed::around("iso_m16_bolt_6k", rotation(&mut random), 1.0, 3.0 * random.direction());
     let nut = Placed { body: body("iso_m16_nut_c25"), at: bolt.at };
     let size = bolt.diagonal();
-    for mode in [Mode::Node, Mode::Exact] {
-        let options = CollideOptions { contact_distance: 2e-5, cos_theta: Some(0.3), ..per_cell(mode) };
+    for mode in [Mode::Node, Mode::exact()] {
+        let options = CollideOptions { contact_distance: 2e-5, ..per_cell(mode.filtered(0.3)) };
         let nut = nut.moved(Pose::at(2e-5 * random.direction()));
         hold(&scene(&[bolt.clone(), nut]), &options, size).is_good(50);
     }
@@ -206,11 +206,13 @@ fn worlds(count: u32, random: &mut Random) -> Scene {
 fn worlds_change_neither_each_other_nor_the_number_of_launches() {
     let mut random = Random(17);
     let scene = worlds(3, &mut random);
-    for (mode, contacts_per) in
-        [(Mode::Node, ContactsPer::Cell), (Mode::Face, ContactsPer::Cell), (Mode::Exact, ContactsPer::Face)]
-    {
+    for (mode, contacts_per) in [
+        (Mode::Node, ContactsPer::Cell),
+        (Mode::face(), ContactsPer::Cell),
+        (Mode::exact(), ContactsPer::Face),
+    ] {
         let options =
-            CollideOptions { contact_distance: 1e-3, contacts_per, ..CollideOptions::with_mode(mode) };
+            CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode.per(contacts_per)) };
         let (all, mut detector) = found(&scene, &options, DetectorOptions::default());
         let launches = detector.report().launches;
         let again = detector.detect(&scene, &options).expect("detects");
@@ -267,7 +269,7 @@ fn groups_and_exclusions() {
 fn buffers_grow_or_say_what_they_need() {
     let mut random = Random(4);
     let scene = worlds(6, &mut random);
-    let options = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::Face) };
+    let options = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::face()) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
     let capacities =
         Capacities { ordered_pairs: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
@@ -289,7 +291,7 @@ fn buffers_grow_or_say_what_they_need() {
 fn every_variant_of_the_narrow_phase_gives_the_same_contacts() {
     let mut random = Random(6);
     let scene = worlds(3, &mut random);
-    let options = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::Face) };
+    let options = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::face()) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
     let usual = DetectorOptions::default();
     for with in [

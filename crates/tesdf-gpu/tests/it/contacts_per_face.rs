@@ -56,7 +56,7 @@ fn minima_are_followed_by_no_lower_point() {
         for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
             let bodies = relation.place(names, &mut random);
             let contact_distance = 1e-3 * bodies[0].diagonal();
-            for mode in [Mode::Exact, Mode::Face] {
+            for mode in [Mode::exact(), Mode::face()] {
                 let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, mode);
                 all = [all[0] + counts[0], all[1] + counts[1]];
             }
@@ -91,7 +91,7 @@ fn a_box_stands_on_a_plane_and_on_four_pegs() {
 
 #[test]
 fn a_vertex_of_several_faces_has_one_contact() {
-    DEVICE.vertex_of_several_faces_has_one_contact(&[Mode::Exact, Mode::Face]);
+    DEVICE.vertex_of_several_faces_has_one_contact(&[Mode::exact(), Mode::face()]);
 }
 
 /// A query of the mode `exact` looks at one point at least.
@@ -102,7 +102,7 @@ fn work_is_counted_without_a_change_of_contacts() {
     for contacts_per in [ContactsPer::Cell, ContactsPer::Face] {
         let contact_distance = 1e-3 * bodies[0].diagonal();
         let options =
-            CollideOptions { contact_distance, contacts_per, ..CollideOptions::with_mode(Mode::Exact) };
+            CollideOptions { contact_distance, ..CollideOptions::with_mode(Mode::exact().per(contacts_per)) };
         let (plain, detector) = found(&scene, &options, DetectorOptions::default());
         let counts = detector.report().counts;
         assert_eq!((counts.evaluations, counts.distances), (0, 0));

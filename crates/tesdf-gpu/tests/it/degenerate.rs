@@ -154,7 +154,7 @@ fn contacts_are_those_of_the_host() {
             let one = hold(&scene, options, diagonal);
             println!("{name}, {:?}: {one:?}", options.mode);
             match options.mode {
-                Mode::Face => frank_wolfe.add(one),
+                Mode::Face { .. } => frank_wolfe.add(one),
                 _ => sure.add(one),
             }
         }

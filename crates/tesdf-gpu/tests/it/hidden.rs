@@ -73,7 +73,7 @@ fn shifted_cubes_overlap_at_every_shift() {
 #[test]
 fn bodies_in_one_place_overlap_in_every_mode() {
     let scene = scene(&[moved(&cube(), DVec3::ZERO), moved(&cube(), DVec3::ZERO)]);
-    for mode in [NODE, Mode::Face, Mode::Exact] {
+    for mode in [NODE, Mode::face(), Mode::exact()] {
         let [device, host] = both(&scene, mode);
         assert_eq!((device.len(), host.len()), (1, 1), "{mode:?}");
         assert!((device[0].depth - host[0].depth).abs() < 1e-5, "{device:?} instead of {host:?}");

@@ -63,12 +63,9 @@ fn is_turned(scene: &Scene, c: &Contact) -> bool {
 fn hold(scene: &Scene, contact_distance: f64, turned: usize) {
     let mut detector = detector(scene);
     let mut seen = 0;
-    for mode in [Mode::Exact, Mode::Face] {
-        let options = CollideOptions {
-            contacts_per: ContactsPer::Cell,
-            contact_distance,
-            ..CollideOptions::with_mode(mode)
-        };
+    for mode in [Mode::exact(), Mode::face()] {
+        let options =
+            CollideOptions { contact_distance, ..CollideOptions::with_mode(mode.per(ContactsPer::Cell)) };
         let expected = detector.detect(scene, &options).expect("detects");
         seen += expected.iter().filter(|c| is_turned(scene, c)).count();
         let staying = detector.detect_on_device(scene, None, &options).expect("detects");

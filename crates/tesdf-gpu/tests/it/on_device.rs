@@ -61,9 +61,9 @@ pub fn read(device: &Device, found: &DeviceContacts) -> Vec<Row> {
 
 /// The contacts of a scene that stay on the device. All of each face, which the device only reduces.
 pub fn staying(scene: &Scene, options: &CollideOptions) -> Vec<Contact> {
-    let reduction = match options.contacts_per {
-        ContactsPer::Cell => Reduction::None,
-        ContactsPer::Face | ContactsPer::Minimum => Reduction::PerPair(10_000),
+    let reduction = match options.mode.contacts_per() {
+        Some(ContactsPer::Cell) | None => Reduction::None,
+        Some(ContactsPer::Face | ContactsPer::Minimum) => Reduction::PerPair(10_000),
     };
     let options = CollideOptions { reduction, ..*options };
     let found = detector(scene).detect_on_device(scene, None, &options).expect("detects");
@@ -154,17 +154,16 @@ pub fn are_among(found: &[Row], all: &[Contact], size: f64, bound: f64, most: us
 }
 
 pub fn each_form() -> Vec<CollideOptions> {
-    let of = |mode, contacts_per, reduction| CollideOptions {
+    let of = |mode: Mode, contacts_per, reduction| CollideOptions {
         contact_distance: 0.01,
-        contacts_per,
         reduction,
-        ..CollideOptions::with_mode(mode)
+        ..CollideOptions::with_mode(mode.per(contacts_per))
     };
     vec![
         of(Mode::Node, ContactsPer::Face, Reduction::None),
-        of(Mode::Face, ContactsPer::Cell, Reduction::None),
-        of(Mode::Exact, ContactsPer::Cell, Reduction::None),
-        of(Mode::Exact, ContactsPer::Face, Reduction::PerPair(12)),
+        of(Mode::face(), ContactsPer::Cell, Reduction::None),
+        of(Mode::exact(), ContactsPer::Cell, Reduction::None),
+        of(Mode::exact(), ContactsPer::Face, Reduction::PerPair(12)),
         of(Mode::Node, ContactsPer::Face, Reduction::Spread(5)),
     ]
 }
@@ -213,8 +212,7 @@ fn contacts_have_the_order_of_a_detection() {
         }
     }
     let mut detector = detector(&scene);
-    let options =
-        CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(Mode::Exact) };
+    let options = CollideOptions::with_mode(Mode::exact().per(ContactsPer::Cell));
     let expected = detector.detect(&scene, &options).expect("detects");
     let found = detector.detect_on_device(&scene, None, &options).expect("detects");
     let rows = read(detector.device(), &found);
@@ -374,7 +372,7 @@ fn overlaps_without_a_contact_are_reported() {
     let found = detector.detect_on_device(&scene, None, &options).expect("detects");
     assert_eq!((found.count, &found.hidden), (0, &expected.hidden));
     assert!(found.hidden.len() == 1 && found.hidden[0].depth > 0.1);
-    let exact = CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(Mode::Exact) };
+    let exact = CollideOptions::with_mode(Mode::exact().per(ContactsPer::Cell));
     let found = detector.detect_on_device(&scene, None, &exact).expect("detects");
     assert!(found.count > 0 && found.hidden.is_empty());
 }
@@ -442,17 +440,16 @@ fn what_is_no_pose_is_an_error() {
 fn what_only_the_processor_does_is_an_error() {
     let scene = worlds(1, &mut Random(8));
     let mut detector = detector(&scene);
-    let of = |mode, contacts_per, reduction| CollideOptions {
-        contacts_per,
+    let of = |mode: Mode, contacts_per, reduction| CollideOptions {
         reduction,
-        ..CollideOptions::with_mode(mode)
+        ..CollideOptions::with_mode(mode.per(contacts_per))
     };
     for (options, text) in [
         (
-            of(Mode::Exact, ContactsPer::Face, Reduction::None),
+            of(Mode::exact(), ContactsPer::Face, Reduction::None),
             "leaving one contact of all faces at a vertex there",
         ),
-        (of(Mode::Exact, ContactsPer::Minimum, Reduction::None), "leaving contacts per minimum there"),
+        (of(Mode::exact(), ContactsPer::Minimum, Reduction::None), "leaving contacts per minimum there"),
     ] {
         let error =
             detector.detect_on_device(&scene, None, &options).map(|found| found.count).expect_err("refused");

@@ -6,15 +6,15 @@ use std::process::Command;
 use crate::compare::per_cell;
 use crate::on_device::{detector, each_form, read, worlds};
 use crate::support::random::Random;
-use tesdf::collide::{CollideOptions, Contacts, ContactsPer, Mode, Reduction};
+use tesdf::collide::{CollideOptions, Contacts, Mode, Reduction};
 
 /// The options of `each_form`, and of the modes and reductions that these leave out.
 fn forms() -> Vec<CollideOptions> {
     let of = |mode| CollideOptions { contact_distance: 0.01, ..per_cell(mode) };
     let more = [
-        CollideOptions { contacts_per: ContactsPer::Face, ..of(Mode::Face) },
-        CollideOptions { cos_theta: Some(0.3), ..of(Mode::Face) },
-        CollideOptions { reduction: Reduction::PerPair(3), ..of(Mode::Exact) },
+        CollideOptions { mode: Mode::face(), ..of(Mode::face()) },
+        of(Mode::face().filtered(0.3)),
+        CollideOptions { reduction: Reduction::PerPair(3), ..of(Mode::exact()) },
     ];
     [each_form(), more.to_vec()].concat()
 }
@@ -28,13 +28,7 @@ fn repeated_detections_give_equal_bytes() {
         let first = detector.detect(&scene, &options).expect("detects");
         assert!(!first.is_empty(), "{options:?}");
         let bytes = |contacts: &Contacts| format!("{contacts:?}");
-        println!(
-            "bytes of {:?} {:?} {:?}: {}",
-            options.mode,
-            options.contacts_per,
-            options.reduction,
-            bytes(&first)
-        );
+        println!("bytes of {:?} {:?}: {}", options.mode, options.reduction, bytes(&first));
         for _ in 0..3 {
             let again = detector.detect(&scene, &options).expect("detects");
             assert!(bytes(&again) == bytes(&first), "two orders differ: {options:?}");

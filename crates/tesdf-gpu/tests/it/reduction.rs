@@ -185,9 +185,9 @@ fn worlds(count: u32, random: &mut Random) -> Scene {
 fn many_worlds() {
     let mut random = Random(17);
     let scene = worlds(6, &mut random);
-    let options = CollideOptions { contact_distance: 1e-3, cos_theta: Some(0.3), ..per_cell(Mode::Face) };
+    let options = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::face().filtered(0.3)) };
     assert!(hold(&scene, &options, &[3, 12, 100_000]) >= 12);
-    let exact = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::Exact) };
+    let exact = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::exact()) };
     hold(&worlds(1, &mut random), &exact, &[6]);
     // The device reduces contacts of faces that stay there.
     for (options, most) in [(&options, 3), (&options, 12), (&exact, 6)] {
@@ -260,7 +260,7 @@ fn contacts_at_one_point() {
             let pose = Pose { translation: pose.translation + by, ..pose };
             scene.add(Instance::new(shape, pose)).expect("an instance");
         }
-        let options = CollideOptions { contact_distance: 0.0, ..per_cell(Mode::Face) };
+        let options = CollideOptions { contact_distance: 0.0, ..per_cell(Mode::face()) };
         assert!(hold(&scene, &options, &[1, 2]) > 0);
         for most in [1, 2] {
             stay(&scene, &options, most);

@@ -125,7 +125,7 @@ fn recorded_contacts_and_those_detected_again_agree() {
     let (record, system, loaded) = simulated();
     let playback = Playback::new(&record, &system, Frames::default()).unwrap();
     let detection = loaded.detection(&system).unwrap();
-    assert_eq!((detection.mode, detection.contact_distance), (Mode::Exact, 1e-3));
+    assert_eq!((detection.mode, detection.contact_distance), (Mode::exact(), 1e-3));
     let found = contacts(&playback, &system, detection);
     // The same states without contacts.
     let mut empty = RunRecord::new(&system, record.scene.clone());
@@ -208,7 +208,7 @@ fn a_scene_without_detection_has_no_contacts_and_a_search_can_be_stopped() {
     let options = ContactOptions { detection: loaded.detection(&system), most: 3 };
     let error = playback.contacts(&system, &options, &stop, |_| {}).unwrap_err();
     assert!(matches!(error, PlaybackError::Collide(CollideError::Stopped)), "{error}");
-    loaded.scene.detector.mode = DetectorMode::Off;
+    loaded.scene.detector.choose(DetectorMode::Off);
     let options = ContactOptions { detection: loaded.detection(&system), most: 3 };
     assert_eq!(options.detection, None);
     assert_eq!(playback.contacts(&system, &options, &stop, |_| {}).unwrap(), None);

@@ -76,7 +76,7 @@ fn impulses_stay_with_their_features() {
 
 #[test]
 fn contacts_of_a_pair_do_not_depend_on_its_order() {
-    let dispatcher = TesdfDispatcher::new(CollideOptions::with_mode(Mode::Exact));
+    let dispatcher = TesdfDispatcher::new(CollideOptions::with_mode(Mode::exact()));
     let (cube, scaled) = (shape(), TesdfShape::scaled(Arc::new(cube(1.0)), 0.5 * HALF).expect("a scale"));
     let pose =
         Pose::from_parts(Vector::new(0.001, 0.002, 1.5 * HALF - 1e-5), Rotation::from_rotation_x(1e-3));

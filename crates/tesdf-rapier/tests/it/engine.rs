@@ -121,7 +121,7 @@ fn groups_worlds_and_exclusions_are_respected() {
     let meets_own_group = system.add("own group", other_plane_only, mass).expect("a pose");
     let excluded = system.add("excluded", at(0.3), mass).expect("a pose");
     system.exclude(plane, excluded).expect("bodies");
-    let mut engine = engine(system, collide(Mode::Exact));
+    let mut engine = engine(system, collide(Mode::exact()));
     for _ in 0..50 {
         engine.step(1e-3).expect("a step");
     }
@@ -140,7 +140,7 @@ fn free_motion_keeps_momentum() {
     let mass = steel(&shape);
     let mut system = System::new(DVec3::ZERO);
     let body = add(&mut system, "box", shape, Pose::at(DVec3::ZERO), Mass::Free(mass));
-    let mut engine = engine(system, collide(Mode::Exact));
+    let mut engine = engine(system, collide(Mode::exact()));
     let state = State {
         linear: DVec3::X,
         angular: DVec3::new(1.0, 20.0, 2.0),
@@ -243,7 +243,7 @@ fn friction_holds_a_box_that_gravity_or_a_wrench_pulls() {
         system.set_friction(body, 0.2).expect("a body");
         let force = pull * mass.mass * 9.81 * DVec3::X;
         system.set_wrench(body, Wrench { force, torque: DVec3::ZERO }).expect("a body");
-        let mut engine = engine(system, collide(Mode::Exact));
+        let mut engine = engine(system, collide(Mode::exact()));
         let mut speed_after = |steps: usize| {
             for _ in 0..steps {
                 engine.step(1e-3).expect("a step");
@@ -270,7 +270,7 @@ fn damping_slows_a_rotation() {
     let spin = DVec3::new(0.0, 0.0, 5.0);
     let state = State { angular: spin, ..system.states()[body] };
     system.set_state(body, state).expect("finite");
-    let mut engine = engine(system, collide(Mode::Exact));
+    let mut engine = engine(system, collide(Mode::exact()));
     for _ in 0..100 {
         engine.step(1e-3).expect("a step");
     }
@@ -288,7 +288,7 @@ fn kinematic_bodies_move_and_joints_are_refused() {
     let state = State { linear: DVec3::Y, ..State::at_rest(Pose::at(DVec3::ZERO)) };
     system.set_state(body, state).expect("a state");
     let mut jointed = system.clone();
-    let mut engine = engine(system, collide(Mode::Exact));
+    let mut engine = engine(system, collide(Mode::exact()));
     for _ in 0..100 {
         engine.step(1e-3).expect("a step");
     }
@@ -296,7 +296,7 @@ fn kinematic_bodies_move_and_joints_are_refused() {
     assert!(pose.translation.distance(0.1 * DVec3::Y) < 1e-9, "{pose:?}");
     let weld = Joint::new("weld", JointKind::Weld, (Some(body), other), [pose; 2], pose);
     jointed.add_joint(weld).expect("a joint");
-    let error = RapierEngine::new(jointed, collide(Mode::Exact), RapierOptions::default()).err();
+    let error = RapierEngine::new(jointed, collide(Mode::exact()), RapierOptions::default()).err();
     let message = error.expect("a refusal").to_string();
     assert_eq!(message, "Rapier does not simulate joints; use the built-in engine");
 }

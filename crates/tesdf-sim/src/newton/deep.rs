@@ -79,7 +79,7 @@ impl Surfaces {
             };
             let normals = match mode {
                 Mode::Node => normals_of_vertices(asset),
-                Mode::Face | Mode::Exact => normals_of_faces(asset),
+                Mode::Face { .. } | Mode::Exact(_) => normals_of_faces(asset),
             };
             Some((id, Surface { normals, vertices: vertices(asset) }))
         };
@@ -104,7 +104,7 @@ impl Surfaces {
                 deep.insert(pair(contact));
             }
         }
-        let of_faces = matches!(self.mode, Mode::Face | Mode::Exact);
+        let of_faces = self.mode != Mode::Node;
         pushes.retain(|pair, pushes| deep.contains(pair) || of_faces && has_rear(pushes));
         if pushes.is_empty() {
             return Cow::Borrowed(contacts);
@@ -198,7 +198,7 @@ fn of_box(shape: &Shape, mode: Mode) -> Surface {
     let vertices: Vec<DVec3> = shape.nodes().into_iter().map(|(corner, _)| corner).collect();
     let normals = match mode {
         Mode::Node => vertices.iter().map(|corner| corner.signum().normalize()).collect(),
-        Mode::Face | Mode::Exact => {
+        Mode::Face { .. } | Mode::Exact(_) => {
             let normal = |part: &Vec<DVec3>| (part[1] - part[0]).cross(part[2] - part[0]).normalize_or_zero();
             shape.parts().0.iter().map(normal).collect()
         }
@@ -325,7 +325,7 @@ mod tests {
             scene.add(Instance::new(shape, Pose::at(DVec3::Z * height))).unwrap();
         }
         let surface = Surface { normals: vec![DVec3::Z], vertices: vec![DVec3::NEG_Z, DVec3::Z] };
-        let surfaces = Surfaces { of_shapes: BTreeMap::from([(shape, surface)]), mode: Mode::Exact };
+        let surfaces = Surfaces { of_shapes: BTreeMap::from([(shape, surface)]), mode: Mode::exact() };
         let (up, down, aside) = (DVec3::Z, DVec3::NEG_Z, DVec3::X);
         let found = [
             // Deep; the deepest contact pushes against the normal.

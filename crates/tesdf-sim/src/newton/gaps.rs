@@ -157,7 +157,7 @@ impl<'a> Gaps<'a> {
         let normals = match self.mode {
             Mode::Node => Some(normals(near.iter().map(|(contact, ..)| *contact))),
             // Those of the detection are in the normal cones.
-            Mode::Face | Mode::Exact => None,
+            Mode::Face { .. } | Mode::Exact(_) => None,
         };
         // Others follow the rows of contacts.
         let mut rows = Vec::with_capacity(near.len() + OTHERS);

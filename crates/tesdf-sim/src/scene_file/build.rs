@@ -14,7 +14,7 @@ use tesdf::{Length, Progress, TeSdf};
 
 use super::read::LoadedScene;
 use super::units::Measure;
-use super::{BodySection, DetectorMode, DetectorSection, SceneError, ShapeSection};
+use super::{BodySection, DetectorSection, SceneError, ShapeSection};
 use crate::newton::{Detect, Newton};
 use crate::{DynamicsError, Mass, MassProperties, System};
 
@@ -94,10 +94,14 @@ impl LoadedScene {
             }
             e => self.value("detector", e),
         })?;
+        if let Some(Length::Absolute(length)) = collide.mode.faces().map(|faces| faces.tolerance) {
+            let reason = format!("a length of {length} m; expected a fraction of the diagonal");
+            return Err(self.value("detector.tolerance", reason));
+        }
         let solver = self.scene.solver;
         match self.scene.detector.mode {
-            DetectorMode::Off => Newton::new(system, Nothing, collide, solver),
-            _ => Newton::new(system, detector, collide, solver),
+            None => Newton::new(system, Nothing, collide, solver),
+            Some(_) => Newton::new(system, detector, collide, solver),
         }
         .map_err(|e| match e {
             DynamicsError::Option { option, found, expected } => {
@@ -111,7 +115,7 @@ impl LoadedScene {
     /// step; `None` in the mode `off`.
     pub fn detection(&self, system: &System) -> Option<CollideOptions> {
         let section = &self.scene.detector;
-        (section.mode != DetectorMode::Off).then(|| collide_options(section, system))
+        section.mode.map(|_| collide_options(section, system))
     }
 
     /// Faces that touch in the states of `system`, and that the scene's mode, where it is `node`,
@@ -121,7 +125,7 @@ impl LoadedScene {
     /// The scene's options are not valid.
     pub fn coarse_contacts(&self, system: &System) -> Result<Vec<CoarseContact>, CollideError> {
         match self.scene.detector.mode {
-            DetectorMode::Node => {
+            Some(Mode::Node) => {
                 let options = collide_options(&self.scene.detector, system);
                 let mut found = coarse_contacts(system.scene(), &options)?;
                 // Bodies that are both fixed need no contacts.
@@ -132,7 +136,7 @@ impl LoadedScene {
                 found.retain(|c| is_free(c.instance_a) || is_free(c.instance_b));
                 Ok(found)
             }
-            DetectorMode::Face | DetectorMode::Exact | DetectorMode::Off => Ok(Vec::new()),
+            _ => Ok(Vec::new()),
         }
     }
 
@@ -154,23 +158,14 @@ impl Detect for Nothing {
     }
 }
 
-/// The detection options of a scene.
+/// The detection options of a scene. In the mode `off`, they are those of the mode `node`.
 fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions {
-    let mode = match section.mode {
-        DetectorMode::Node | DetectorMode::Off => Mode::Node,
-        DetectorMode::Face => Mode::Face,
-        DetectorMode::Exact => Mode::Exact,
-    };
     let contact_distance =
         section.contact_distance.unwrap_or_else(|| CONTACT_DISTANCE * smallest_free_body(system));
     CollideOptions {
-        mode,
-        contacts_per: section.contacts_per,
-        iterations: section.iterations,
-        tolerance: Length::OfDiagonal(section.tolerance),
+        mode: section.mode.unwrap_or(Mode::Node),
         contact_distance,
-        cos_theta: section.cos_theta,
-        ..CollideOptions::default()
+        ..CollideOptions::for_simulation()
     }
 }
 
@@ -262,7 +257,7 @@ fn inside(body: &BodySection) -> Result<Inside, String> {
     }
     let rule = inside.as_deref().map(str::parse).transpose();
     let choices = EncodeChoices {
-        rule: rule
+        inside: rule
             .map_err(|e| format!("inside is {}; {e}", inside.as_deref().unwrap_or_default()))?
             .unwrap_or_default(),
         thickness: *thickness,

@@ -62,8 +62,9 @@ mod units;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
-use tesdf::base::SurfaceFaces;
-use tesdf::collide::ContactsPer;
+use tesdf::Length;
+use tesdf::base::{Named as _, SurfaceFaces};
+use tesdf::collide::{CollideError, CollideOptions, ContactsPer, FaceOptions, Mode, ModeChoices, ModeName};
 use toml::Spanned;
 
 pub use copies::CopiesSection;
@@ -276,7 +277,7 @@ pub enum ShapeSection {
     },
 }
 
-/// The features of one body that are tested against the distance field of the other.
+/// The modes of a scene file: those of a detection, and `off`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DetectorMode {
@@ -291,36 +292,125 @@ pub enum DetectorMode {
     Off,
 }
 
+tesdf::named!(DetectorMode {
+    Node: "node", "The vertices";
+    Face: "face", "The faces, by Frank-Wolfe iterations";
+    Exact: "exact", "The faces, with the exact minimum";
+    Off: "off", "Nothing: bodies pass through each other, and a criterion should fail";
+});
+
+impl DetectorMode {
+    /// The mode of a detection; `None` for `off`.
+    fn of_detection(self) -> Option<ModeName> {
+        match self {
+            Self::Node => Some(ModeName::Node),
+            Self::Face => Some(ModeName::Face),
+            Self::Exact => Some(ModeName::Exact),
+            Self::Off => None,
+        }
+    }
+}
+
 /// How contacts are detected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "DetectorText", into = "DetectorText")]
 pub struct DetectorSection {
-    /// Which features are tested.
-    pub mode: DetectorMode,
-    /// What a contact of the modes `face` and `exact` stands for: a face in one cell of the other
-    /// body, a face, or a local minimum of the distance over the surface. As planes, other contacts
-    /// of faces stop bodies that have room.
-    pub contacts_per: ContactsPer,
-    /// Number of Frank–Wolfe iterations in the mode `face`.
-    pub iterations: u32,
-    /// Tolerance in the mode `exact`, as a fraction of the diagonal of the body with the field.
-    pub tolerance: f64,
-    /// Cosine filter of the modes `face` and `exact`.
-    pub cos_theta: Option<f64>,
+    /// The mode with its options; the tolerance is a fraction of the diagonal. `None`: nothing is
+    /// detected, as the mode `off` says.
+    pub mode: Option<Mode>,
     /// Contacts are recorded up to this distance, m, in addition to the distance that motion can
     /// close in a step [default: 0.5 % of the diagonal of the smallest body that is not fixed].
     pub contact_distance: Option<f64>,
 }
 
+impl DetectorSection {
+    /// The name of the mode.
+    pub fn name(&self) -> DetectorMode {
+        match self.mode.map(|mode| mode.kind()) {
+            Some(ModeName::Node) => DetectorMode::Node,
+            Some(ModeName::Face) => DetectorMode::Face,
+            Some(ModeName::Exact) => DetectorMode::Exact,
+            None => DetectorMode::Off,
+        }
+    }
+
+    /// Chooses another mode. It has the options of faces that the section has, where both modes use
+    /// them, and otherwise [`FaceOptions::OF_SIMULATION`].
+    pub fn choose(&mut self, name: DetectorMode) {
+        if self.name() != name {
+            let faces = self.mode.as_ref().and_then(Mode::faces).copied();
+            let faces = faces.unwrap_or(FaceOptions::OF_SIMULATION);
+            self.mode = name.of_detection().map(|name| name.with(faces));
+        }
+    }
+}
+
 impl Default for DetectorSection {
     fn default() -> Self {
+        Self { mode: Some(CollideOptions::for_simulation().mode), contact_distance: None }
+    }
+}
+
+/// The keys of `[detector]`. A run has all of them, so one that its mode does not use may have its
+/// default.
+#[derive(Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct DetectorText {
+    mode: DetectorMode,
+    contacts_per: ContactsPer,
+    iterations: u32,
+    /// Fraction of the diagonal.
+    tolerance: f64,
+    cos_theta: Option<f64>,
+    contact_distance: Option<f64>,
+}
+
+impl Default for DetectorText {
+    fn default() -> Self {
+        DetectorSection::default().into()
+    }
+}
+
+impl TryFrom<DetectorText> for DetectorSection {
+    type Error = CollideError;
+
+    fn try_from(text: DetectorText) -> Result<Self, CollideError> {
+        let usual = DetectorText::default();
+        let name = text.mode.of_detection();
+        let choices = ModeChoices {
+            // The mode `off` uses no option either.
+            mode: name.or(Some(ModeName::Node)),
+            contacts_per: (text.contacts_per != usual.contacts_per).then_some(text.contacts_per),
+            iterations: (text.iterations != usual.iterations).then_some(text.iterations),
+            tolerance: (text.tolerance != usual.tolerance).then_some(Length::OfDiagonal(text.tolerance)),
+            cos_theta: text.cos_theta,
+        };
+        let mode = choices.mode(FaceOptions::OF_SIMULATION).map_err(|e| match e {
+            CollideError::NotOfMode { option, modes, .. } => {
+                CollideError::NotOfMode { option, mode: text.mode.name(), modes }
+            }
+            e => e,
+        })?;
+        Ok(Self { mode: name.map(|_| mode), contact_distance: text.contact_distance })
+    }
+}
+
+impl From<DetectorSection> for DetectorText {
+    fn from(section: DetectorSection) -> Self {
+        let faces =
+            section.mode.as_ref().and_then(Mode::faces).copied().unwrap_or(FaceOptions::OF_SIMULATION);
+        // A length is refused before a scene is written.
+        let (Length::OfDiagonal(tolerance) | Length::Absolute(tolerance)) = faces.tolerance;
         Self {
-            mode: DetectorMode::Exact,
-            contacts_per: ContactsPer::Minimum,
-            iterations: 16,
-            tolerance: 1e-7,
-            cos_theta: None,
-            contact_distance: None,
+            mode: section.name(),
+            contacts_per: faces.contacts_per,
+            iterations: match section.mode {
+                Some(Mode::Face { iterations, .. }) => iterations,
+                _ => Mode::ITERATIONS,
+            },
+            tolerance,
+            cos_theta: faces.cos_theta,
+            contact_distance: section.contact_distance,
         }
     }
 }

@@ -68,7 +68,7 @@ fn error_of_the_meshes() -> f64 {
 fn the_gears_turn_at_the_ratio_of_their_teeth() {
     for (mode, duration) in [(DetectorMode::Node, 1.25), (DetectorMode::Exact, 0.5)] {
         let (_, summary) = run(|loaded, _| {
-            loaded.scene.detector.mode = mode;
+            loaded.scene.detector.choose(mode);
             loaded.scene.duration = duration;
             loaded
                 .scene
@@ -106,7 +106,7 @@ fn the_transmission_error_is_that_of_the_meshes() {
 
 #[test]
 fn without_contacts_or_with_a_load_that_drives_the_criterion_fails() {
-    let (_, off) = run(|loaded, _| loaded.scene.detector.mode = DetectorMode::Off);
+    let (_, off) = run(|loaded, _| loaded.scene.detector.choose(DetectorMode::Off));
     assert_eq!(off.passed, Some(false));
     let gears = off.report::<GearRatioReport>().unwrap();
     assert!(gears.driven_turns > 1000.0, "{gears:?}");

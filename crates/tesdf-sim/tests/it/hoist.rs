@@ -75,7 +75,7 @@ fn the_platform_rises_the_same_on_any_number_of_threads() {
 #[test]
 fn with_a_skin_vertices_hoist_it() {
     let loaded = load(short("chained-sam-nodes", ["-2.891397", "-0.290127"])).unwrap();
-    assert_eq!(loaded.scene.detector.mode, DetectorMode::Node);
+    assert_eq!(loaded.scene.detector.name(), DetectorMode::Node);
     let (_, summary) = run_loaded(&loaded);
     assert_eq!(summary.passed, Some(true), "{summary:?}");
 }
@@ -102,7 +102,7 @@ fn both_scenes_are_one_but_for_a_few_values() {
 
 #[test]
 fn without_contacts_the_platform_falls() {
-    let (_, summary) = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let (_, summary) = run(|loaded| loaded.scene.detector.choose(DetectorMode::Off));
     assert_eq!(summary.passed, Some(false));
     let failures = failures(&summary);
     assert!(failures.contains("rise: ") && failures.contains("linking: "), "{failures}");

@@ -33,7 +33,7 @@ fn names(report: &LiftReport) -> Vec<&str> {
 fn the_gripper_lifts_the_peg_and_holds_it() {
     for (mode, duration) in [(DetectorMode::Node, 2.0), (DetectorMode::Exact, 1.2)] {
         let (_, summary) = run(|loaded, _| {
-            loaded.scene.detector.mode = mode;
+            loaded.scene.detector.choose(mode);
             loaded.scene.duration = duration;
         });
         assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
@@ -49,7 +49,7 @@ fn the_gripper_lifts_the_peg_and_holds_it() {
 
 #[test]
 fn without_contacts_or_friction_the_criterion_fails() {
-    let (_, off) = run(|loaded, _| loaded.scene.detector.mode = DetectorMode::Off);
+    let (_, off) = run(|loaded, _| loaded.scene.detector.choose(DetectorMode::Off));
     assert_eq!(off.passed, Some(false));
     let lift = off.report::<LiftReport>().unwrap();
     assert!(lift.rise < -1.0, "{lift:?}");

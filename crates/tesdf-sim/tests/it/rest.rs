@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
-use tesdf::collide::{CollideOptions, ContactsPer, Instance, Pose, Shape, ShapeId, detect};
+use tesdf::collide::{CollideOptions, Instance, Pose, Shape, ShapeId, detect};
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
@@ -80,11 +80,7 @@ impl Bodies {
     }
 
     fn report(self, after: f64, seconds: f64) -> RestReport {
-        let collide = CollideOptions {
-            contacts_per: ContactsPer::Minimum,
-            contact_distance: 5e-4,
-            ..CollideOptions::default()
-        };
+        let collide = CollideOptions { contact_distance: 5e-4, ..CollideOptions::for_simulation() };
         // A constant force moves a body by the square of the time.
         let max_drift = DRIFT * (seconds / 10.0).powi(2);
         let criterion = RestCriterion { after, max_drift, max_energy_gain: ROUNDING };
@@ -206,7 +202,7 @@ fn the_stack_meets_its_criterion_only_with_contacts() {
     let rest = summary.report::<RestReport>().unwrap();
     assert!(rest.drift > 0.0 && rest.drift < 1e-9, "{rest:?}");
 
-    let summary = scene("stack.toml", |loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let summary = scene("stack.toml", |loaded| loaded.scene.detector.choose(DetectorMode::Off));
     assert_eq!(summary.passed, Some(false));
     let rest = summary.report::<RestReport>().unwrap();
     assert!(rest.drift > 0.04 && rest.failures[0].contains("drifts by"), "{rest:?}");
@@ -229,7 +225,7 @@ fn the_wall_meets_its_criterion_only_with_contacts() {
     // A constant force moves a body by the square of the time.
     assert!(rest.drift < DRIFT * 0.01 && rest.energy_gain < ROUNDING, "{rest:?}");
 
-    let summary = scene("brick-wall.toml", |loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let summary = scene("brick-wall.toml", |loaded| loaded.scene.detector.choose(DetectorMode::Off));
     let rest = summary.report::<RestReport>().unwrap();
     assert!(rest.drift > 0.04 && rest.failures[0].contains("drifts by"), "{rest:?}");
 }

@@ -46,7 +46,7 @@ fn refusal(text: &str) -> String {
 #[test]
 fn a_scene_file_gives_its_system() {
     let loaded = load(DROP).unwrap();
-    assert_eq!(loaded.scene.detector.mode, DetectorMode::Exact);
+    assert_eq!(loaded.scene.detector.name(), DetectorMode::Exact);
     assert_eq!(loaded.scene.gravity, [0.0, 0.0, -9.81]);
     let system = loaded.system().unwrap();
     assert_eq!(system.bodies()[0].mass, Mass::Fixed);
@@ -137,6 +137,18 @@ fn errors_name_the_line_and_the_body() {
         (change("[record]", "[detector]\ntolerance = 0\n[record]"), vec!["detector", "tolerance"]),
         (change("[record]", "[detector]\nmode = \"vertex\"\n[record]"), vec!["line 6", "vertex"]),
         (change("[record]", "[detector]\ncontacts_per = \"body\"\n[record]"), vec!["line 6", "body"]),
+        (
+            change("[record]", "[detector]\nmode = \"node\"\ncontacts_per = \"cell\"\n[record]"),
+            vec!["line 5", "contacts_per has no effect in the mode `node`, only in `face` and `exact`"],
+        ),
+        (
+            change("[record]", "[detector]\niterations = 32\n[record]"),
+            vec!["line 5", "iterations has no effect in the mode `exact`, only in `face`"],
+        ),
+        (
+            change("[record]", "[detector]\nmode = \"off\"\ncos_theta = 0.5\n[record]"),
+            vec!["line 5", "cos_theta has no effect in the mode `off`"],
+        ),
         (
             DROP.to_string()
                 + "[criterion.screw]\nbody = \"nut\"\naxis = [0,0,1]\npitch = 1\nmin_turns = 1\nbacklash = 1",

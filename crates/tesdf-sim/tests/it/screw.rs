@@ -34,7 +34,7 @@ fn run(change: impl FnOnce(&mut LoadedScene)) -> Summary {
 fn the_nut_turns_down_the_bolt() {
     for (time_step, redetections) in [(1e-3, 0), (3e-3, 1), (5e-3, 2)] {
         let summary = run(|loaded| {
-            loaded.scene.detector.mode = DetectorMode::Node;
+            loaded.scene.detector.choose(DetectorMode::Node);
             loaded.scene.time_step = time_step;
             loaded.scene.solver.redetections = redetections;
         });
@@ -61,7 +61,7 @@ fn the_nut_is_not_followed() {
 
 #[test]
 fn without_contacts_the_criterion_fails() {
-    let summary = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let summary = run(|loaded| loaded.scene.detector.choose(DetectorMode::Off));
     assert_eq!(summary.passed, Some(false));
     let screw = summary.report::<ScrewReport>().unwrap();
     assert!(screw.turns.abs() < 1e-9 && screw.travel > 0.01, "{screw:?}");

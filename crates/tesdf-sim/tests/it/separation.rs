@@ -36,7 +36,7 @@ fn shafts_that_cross_come_apart() {
     for mode in [DetectorMode::Exact, DetectorMode::Face, DetectorMode::Node] {
         for offset in [0.0, 1e-6, 3e-3, 1.2e-2] {
             let mut loaded = crossing(offset);
-            loaded.scene.detector.mode = mode;
+            loaded.scene.detector.choose(mode);
             let found = run(&loaded).report::<SeparationReport>().unwrap().clone();
             assert!(found.penetration[0] > 5e-3, "{offset}: {found:?}");
             assert_eq!(found.failures, [""; 0], "{mode:?}, {offset}: {found:?}");
@@ -60,7 +60,7 @@ fn a_small_pile_comes_apart_the_same_on_any_number_of_threads() {
 #[test]
 fn without_contacts_the_criterion_fails() {
     let mut loaded = crossing(0.0);
-    loaded.scene.detector.mode = DetectorMode::Off;
+    loaded.scene.detector.choose(DetectorMode::Off);
     let summary = run(&loaded);
     assert_eq!(summary.passed, Some(false));
     let failures = summary.report::<SeparationReport>().unwrap().failures.clone();
@@ -142,7 +142,7 @@ fn gain(record: &RunRecord, system: &mut System) -> [f64; 2] {
 fn a_small_pile_has_no_energy_but_that_of_gravity() {
     for mode in [DetectorMode::Exact, DetectorMode::Node, DetectorMode::Face] {
         let mut loaded = small_pile();
-        loaded.scene.detector.mode = mode;
+        loaded.scene.detector.choose(mode);
         let (record, summary) = crate::support::run(&loaded, loaded.system().unwrap());
         let found = summary.report::<SeparationReport>().unwrap();
         let [gain, most] = gain(&record, &mut loaded.system().unwrap());

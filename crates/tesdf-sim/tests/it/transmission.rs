@@ -89,7 +89,7 @@ fn two_gears_engage_and_drive() {
 fn a_gear_engages_with_faces() {
     let (_, summary) = run(|loaded| {
         shorten(loaded);
-        loaded.scene.detector.mode = DetectorMode::Exact;
+        loaded.scene.detector.choose(DetectorMode::Exact);
     });
     assert_eq!(summary.passed, Some(true), "{summary:?}");
 }
@@ -111,7 +111,7 @@ fn a_gear_drives_the_same_on_any_number_of_threads() {
 #[test]
 #[ignore = "a whole scene: .ci/release"]
 fn without_contacts_nothing_turns() {
-    let (_, summary) = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let (_, summary) = run(|loaded| loaded.scene.detector.choose(DetectorMode::Off));
     let failures = failures(&summary);
     assert!(failures.contains("ratio: ") && failures.contains("turns: "), "{failures}");
 }

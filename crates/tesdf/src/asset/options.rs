@@ -2,6 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::base::{Inside, InsideRule, Length};
 use crate::geometry::Aabb;
+use crate::named;
 
 /// A set of options by name: a balance of memory and speed, or the options of the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,6 +23,15 @@ pub enum Preset {
     /// [`EncodeOptions::SAMPLED_SAFE`].
     SampledSafe,
 }
+
+named!(Preset {
+    Default: "default", "Fast queries";
+    Fast: "fast", "Fast encoding";
+    Compact: "compact", "Small files";
+    Gpu: "gpu", "Few cells, whose lists fill the 32 threads of a GPU that read them; for detection on a GPU";
+    Paper: "paper", "The paper's encoder: sampled, 129 samples along an edge, tetrahedra not bisected";
+    SampledSafe: "sampled-safe", "Sampled with a threshold that is large enough that no needed face is missing";
+});
 
 /// How the faces of a list are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -80,6 +80,11 @@ pub enum SurfaceFaces {
     Boundary,
 }
 
+crate::named!(SurfaceFaces {
+    All: "all", "All faces";
+    Boundary: "boundary", "Faces between inside and outside; faces within the solid are left out";
+});
+
 /// What is inside of a mesh, and which of its faces are the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inside {

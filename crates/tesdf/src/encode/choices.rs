@@ -13,6 +13,7 @@ use crate::base::{Inside, InsideRule, Length, Progress, SurfaceFaces};
 use crate::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
 use crate::domain::{ConformingError, ConformingMesh, ReadTetrahedraError, read_tetrahedra};
 use crate::mesh::SolidMesh;
+use crate::named;
 
 /// Ways to cut space into tetrahedra.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,16 +42,21 @@ impl FromStr for DomainChoice {
 
 /// Ways to find the closest faces of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MethodChoice {
+pub enum EncoderChoice {
     /// By proof: no face that can be closest is left out.
     Certified,
     /// By samples: the faces that are closest at samples, as in the paper.
     Sampled,
 }
 
+named!(EncoderChoice {
+    Certified: "certified", "Proven: no face that can be closest is missing";
+    Sampled: "sampled", "Faces that are closest at samples, as in the paper; faces that are closest only between samples may be missing";
+});
+
 /// Rules of what is inside, by the names that the commands give them. See [`InsideRule`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RuleChoice {
+pub enum InsideChoice {
     /// [`InsideRule::Winding`]
     #[default]
     Winding,
@@ -64,21 +70,13 @@ pub enum RuleChoice {
     Sheet,
 }
 
-impl FromStr for RuleChoice {
-    type Err = String;
-
-    /// The name of a rule.
-    fn from_str(text: &str) -> Result<Self, String> {
-        Ok(match text {
-            "winding" => Self::Winding,
-            "nonzero" => Self::Nonzero,
-            "odd" => Self::Odd,
-            "generalized" => Self::Generalized,
-            "sheet" => Self::Sheet,
-            _ => return Err("expected winding, nonzero, odd, generalized or sheet".into()),
-        })
-    }
-}
+named!(InsideChoice {
+    Winding: "winding", "A winding number of 1 or more; the mesh must be closed";
+    Nonzero: "nonzero", "A winding number other than 0: takes shells that are inside out; the mesh must be closed";
+    Odd: "odd", "An odd winding number: overlaps of two solids are outside; the mesh must be closed";
+    Generalized: "generalized", "A generalised winding number of 1/2 or more in absolute value; for open meshes, whose distance jumps in the holes";
+    Sheet: "sheet", "Nearer to a face than half of a thickness; for sheets, and any other faces";
+});
 
 /// What a user may choose. `None` stands for the value of the preset.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -88,14 +86,14 @@ pub struct EncodeChoices {
     /// How space is cut into tetrahedra.
     pub domain: DomainChoice,
     /// How the closest faces of each tetrahedron are found.
-    pub method: Option<MethodChoice>,
+    pub encoder: Option<EncoderChoice>,
     /// Samples along an edge of a tetrahedron, less one. The default is 32, unless the preset has
     /// its own value.
     pub resolution: Option<u32>,
     /// How much farther than the closest face a listed face may be at a sample.
     pub threshold: Option<Threshold>,
     /// E_max: longer lists are cut to this many faces.
-    pub max_entries: Option<NonZeroU32>,
+    pub e_max: Option<NonZeroU32>,
     /// Whether the vertices will move.
     pub deformation: Deformation,
     /// How the tetrahedra of a conforming domain are refined.
@@ -107,7 +105,7 @@ pub struct EncodeChoices {
     /// Name of the unit of the mesh. Nothing is scaled.
     pub unit: Option<String>,
     /// What is inside.
-    pub rule: RuleChoice,
+    pub inside: InsideChoice,
     /// The thickness of a sheet, in the unit of the mesh.
     pub thickness: Option<f64>,
     /// Which faces are the surface.
@@ -183,11 +181,11 @@ impl EncodeChoices {
     /// [`ChoiceError`]: choices that exclude each other.
     pub fn options(&self) -> Result<EncodeOptions, ChoiceError> {
         let of_preset = EncodeOptions::preset(self.preset);
-        let method = match (self.method, of_preset.method) {
-            (Some(MethodChoice::Certified), Method::Sampled(_)) => {
+        let method = match (self.encoder, of_preset.method) {
+            (Some(EncoderChoice::Certified), Method::Sampled(_)) => {
                 return Err(ChoiceError::CertifiedPreset);
             }
-            (Some(MethodChoice::Sampled), Method::Certified) => {
+            (Some(EncoderChoice::Sampled), Method::Certified) => {
                 Method::Sampled(Sampling { resolution: RESOLUTION, ..Sampling::PAPER })
             }
             (_, method) => method,
@@ -216,7 +214,7 @@ impl EncodeChoices {
             method,
             refinement,
             deformation: self.deformation,
-            max_entries: self.max_entries.map(Into::into),
+            max_entries: self.e_max.map(Into::into),
             band: self.band.map_or(of_preset.band, Length::Absolute),
             regions: self.regions.clone(),
             unit: self.unit.clone(),
@@ -230,16 +228,16 @@ impl EncodeChoices {
     /// # Errors
     /// [`ChoiceError`]: choices that exclude each other.
     pub fn inside(&self) -> Result<Inside, ChoiceError> {
-        let rule = match (self.rule, self.thickness) {
-            (RuleChoice::Sheet, Some(thickness)) => InsideRule::Sheet { thickness },
-            (RuleChoice::Sheet, None) => return Err(ChoiceError::NoThickness),
+        let rule = match (self.inside, self.thickness) {
+            (InsideChoice::Sheet, Some(thickness)) => InsideRule::Sheet { thickness },
+            (InsideChoice::Sheet, None) => return Err(ChoiceError::NoThickness),
             (_, Some(_)) => return Err(ChoiceError::NotASheet),
-            (RuleChoice::Winding, None) => InsideRule::Winding,
-            (RuleChoice::Nonzero, None) => InsideRule::Nonzero,
-            (RuleChoice::Odd, None) => InsideRule::Odd,
-            (RuleChoice::Generalized, None) => InsideRule::Generalized,
+            (InsideChoice::Winding, None) => InsideRule::Winding,
+            (InsideChoice::Nonzero, None) => InsideRule::Nonzero,
+            (InsideChoice::Odd, None) => InsideRule::Odd,
+            (InsideChoice::Generalized, None) => InsideRule::Generalized,
         };
-        if self.rule == RuleChoice::Sheet && self.surface == SurfaceFaces::Boundary {
+        if self.inside == InsideChoice::Sheet && self.surface == SurfaceFaces::Boundary {
             return Err(ChoiceError::BoundaryOfSheet);
         }
         Ok(Inside { rule, surface: self.surface })

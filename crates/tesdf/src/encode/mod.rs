@@ -47,7 +47,7 @@ pub use crate::asset::about::Source;
 pub use crate::asset::options::{
     Deformation, EncodeOptions, Groups, Method, Preset, Refinement, Sampling, Threshold,
 };
-pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, MethodChoice, RuleChoice};
+pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, EncoderChoice, InsideChoice};
 pub use encoder::{EncodeFileError, Encoder};
 pub use error::EncodeError;
 pub use roots::Domain;

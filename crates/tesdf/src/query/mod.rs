@@ -111,6 +111,11 @@ pub enum Precision {
     F64,
 }
 
+crate::named!(Precision {
+    F64: "f64", "Faces as they are in the mesh";
+    F32: "f32", "Faces rounded to 32 bits";
+});
+
 /// The answer to a query, in the mesh's unit and frame.
 ///
 /// A point with a NaN or infinite coordinate has no answer: the numbers are NaN, and the face is

@@ -7,8 +7,8 @@ use crate::support::meshes::named;
 use crate::support::random::Random;
 use crate::support::shapes::Shape as Surface;
 use tesdf::collide::{
-    Clearance, ClearanceOptions, CollideError, CollideOptions, Instance, InstanceId, Pose, Scene, Shape,
-    clearance, detect,
+    Clearance, ClearanceOptions, CollideError, CollideOptions, Instance, InstanceId, Mode, Pose, Scene,
+    Shape, clearance, detect,
 };
 use tesdf::encode::{Encoder, Preset};
 use tesdf::geometry::{Triangle, polygon_to_triangle};
@@ -198,7 +198,7 @@ fn the_depth_is_that_of_the_lowest_contact_of_all_faces() {
         let (scene, [a, b]) = scene(deep(&mut random, pair));
         let found = clearance(&scene, a, b, &ClearanceOptions::default()).expect("a clearance");
         // The exact mode searches each face by itself, cell by cell.
-        let options = CollideOptions { tolerance: Length::Absolute(1e-8), ..CollideOptions::default() };
+        let options = CollideOptions::with_mode(Mode::exact().within(Length::Absolute(1e-8)));
         let contacts = detect(&scene, &options).expect("contacts");
         let lowest = contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
         assert!(found.converged && lowest < 0.0, "{round}: {found:?}");

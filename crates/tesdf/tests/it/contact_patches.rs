@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::support::bodies::{Body, body};
 use crate::support::shapes;
 use tesdf::collide::{
-    CollideError, CollideOptions, ContactPatches, ContactsPer, Instance, InstanceId, PatchOptions,
-    PatchTracker, Pose, Scene, Shape, detect,
+    CollideError, CollideOptions, ContactPatches, Instance, InstanceId, Mode, PatchOptions, PatchTracker,
+    Pose, Scene, Shape, detect,
 };
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
@@ -17,10 +17,8 @@ const CONTACT_DISTANCE: f64 = 1e-4;
 
 fn options() -> CollideOptions {
     CollideOptions {
-        contacts_per: ContactsPer::Face,
         contact_distance: CONTACT_DISTANCE,
-        cos_theta: Some(0.5),
-        ..CollideOptions::default()
+        ..CollideOptions::with_mode(Mode::exact().filtered(0.5))
     }
 }
 

@@ -72,8 +72,10 @@ impl BruteForce {
 /// decide.
 fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distance: f64) -> [usize; 2] {
     let all = BruteForce::of(&bodies[a], &bodies[b], stride, contact_distance);
-    let contacts_per = ContactsPer::Cell;
-    let options = CollideOptions { contact_distance, contacts_per, ..CollideOptions::default() };
+    let options = CollideOptions {
+        contact_distance,
+        ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Cell))
+    };
     let scene = scene(bodies);
     let found = detect(&scene, &options).expect("a good scene");
     let of_stride = |face: u32| (face as usize).is_multiple_of(stride);

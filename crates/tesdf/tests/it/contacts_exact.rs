@@ -10,7 +10,7 @@ use crate::support::shapes;
 use rayon::prelude::*;
 use tesdf::Length;
 use tesdf::collide::{
-    CollideOptions, Contacts, ContactsPer, Instance, Placement, Pose, Scene, Shape, detect,
+    CollideOptions, Contacts, ContactsPer, Instance, Mode, Placement, Pose, Scene, Shape, detect,
 };
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
@@ -23,7 +23,7 @@ const TOLERANCE: f64 = 1.001e-7;
 
 /// Contacts of every face, also of those that share a vertex.
 fn per_cell() -> CollideOptions {
-    CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::default() }
+    CollideOptions::with_mode(Mode::exact().per(ContactsPer::Cell))
 }
 
 /// The least distance of each face of an ordered pair.
@@ -243,7 +243,7 @@ fn tolerances_bound_the_error() {
     let fine = detect(&scene, &per_cell()).expect("a good scene");
     for share in [1e-3, 1e-5] {
         for tolerance in [Length::OfDiagonal(share), Length::Absolute(share * bodies[0].diagonal())] {
-            let coarse = CollideOptions { tolerance, ..per_cell() };
+            let coarse = CollideOptions::with_mode(per_cell().mode.within(tolerance));
             let coarse = detect(&scene, &coarse).expect("a good scene");
             for (a, b) in [(0, 1), (1, 0)] {
                 let allowed = match tolerance {

@@ -13,7 +13,7 @@ use tesdf::collide::{
 use tesdf::glam::{DQuat, DVec3};
 
 const NODE: Mode = Mode::Node;
-const MODES: [Mode; 3] = [NODE, Mode::Face, Mode::Exact];
+const MODES: [Mode; 3] = [NODE, Mode::face(), Mode::exact()];
 const IDS: [InstanceId; 2] = [InstanceId(0), InstanceId(1)];
 
 /// A mesh of the box from 0 to `size`.
@@ -91,8 +91,8 @@ fn equal_cubes_that_pass_through_each_other_along_an_edge() {
                     // Alternatively, the reported depth is the radius of a ball inside both bodies,
                     // which may be greater.
                     assert!((0.74 * depth..=0.5).contains(&told), "{told} instead of {depth}");
-                    assert!(deepest(&found(&scene, Mode::Face)) > 0.9 * depth);
-                    assert_eq!(hidden(&scene, Mode::Face).filter(|_| depth > 0.2), None, "faces show it");
+                    assert!(deepest(&found(&scene, Mode::face())) > 0.9 * depth);
+                    assert_eq!(hidden(&scene, Mode::face()).filter(|_| depth > 0.2), None, "faces show it");
                 }
             }
         }

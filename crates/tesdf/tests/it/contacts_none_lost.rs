@@ -250,18 +250,16 @@ fn no_contact_is_lost() {
             let moved = [bodies[0].moved(motion), bodies[1].moved(motion)];
             // Accepted differences: twice the tolerance in the exact mode, rounding for nodes.
             for (mode, error) in
-                [(Mode::Node, 1e-12), (Mode::Exact, 2.1 * COARSE), (Mode::Face, f64::INFINITY)]
+                [(Mode::Node, 1e-12), (Mode::exact(), 2.1 * COARSE), (Mode::face(), f64::INFINITY)]
             {
                 // When surfaces coincide, the exact mode reaches its limit of evaluations.
                 let is_flat = matches!(relation, Relation::Same | Relation::SharedFaces);
-                if mode == Mode::Exact && is_flat && !is_small(bodies) {
+                if mode == Mode::exact() && is_flat && !is_small(bodies) {
                     continue;
                 }
                 let options = CollideOptions {
                     contact_distance,
-                    contacts_per: ContactsPer::Cell,
-                    tolerance: TOLERANCE,
-                    ..CollideOptions::with_mode(mode)
+                    ..CollideOptions::with_mode(mode.per(ContactsPer::Cell).within(TOLERANCE))
                 };
                 let found = detect(&scene, &options).expect("a good scene");
                 let of_others = detect(&swapped, &options).expect("a good scene");
@@ -278,7 +276,9 @@ fn no_contact_is_lost() {
                 for (a, b) in [(0, 1), (1, 0)] {
                     match mode {
                         Mode::Node => has_all_nodes(&found, bodies, a, b, contact_distance),
-                        Mode::Face => has_the_deepest(&found, bodies, a, b, contact_distance, FRANK_WOLFE),
+                        Mode::Face { .. } => {
+                            has_the_deepest(&found, bodies, a, b, contact_distance, FRANK_WOLFE)
+                        }
                         _ => has_the_deepest(&found, bodies, a, b, contact_distance, 1.01 * COARSE),
                     }
                 }
@@ -313,16 +313,14 @@ fn the_same_bytes_on_any_number_of_threads() {
     let scene = scene(&bodies);
     for (mode, contacts_per) in [
         (Mode::Node, ContactsPer::Face),
-        (Mode::Face, ContactsPer::Cell),
-        (Mode::Face, ContactsPer::Face),
-        (Mode::Exact, ContactsPer::Cell),
-        (Mode::Exact, ContactsPer::Face),
+        (Mode::face(), ContactsPer::Cell),
+        (Mode::face(), ContactsPer::Face),
+        (Mode::exact(), ContactsPer::Cell),
+        (Mode::exact(), ContactsPer::Face),
     ] {
         let options = CollideOptions {
             contact_distance: 1e-4,
-            contacts_per,
-            tolerance: TOLERANCE,
-            ..CollideOptions::with_mode(mode)
+            ..CollideOptions::with_mode(mode.per(contacts_per).within(TOLERANCE))
         };
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");

@@ -58,7 +58,7 @@ fn minima_are_followed_by_no_lower_point() {
         for relation in of_the_day(RELATIONS.into_iter().filter(|&relation| relation != Relation::Same)) {
             let bodies = relation.place(names, &mut random);
             let contact_distance = 1e-3 * bodies[0].diagonal();
-            for mode in [Mode::Exact, Mode::Face] {
+            for mode in [Mode::exact(), Mode::face()] {
                 let counts = PROCESSOR.minima_are_followed_by_no_lower_point(&bodies, contact_distance, mode);
                 all = [all[0] + counts[0], all[1] + counts[1]];
             }
@@ -93,7 +93,7 @@ fn a_box_stands_on_a_plane_and_on_four_pegs() {
 
 #[test]
 fn a_vertex_of_several_faces_has_one_contact() {
-    PROCESSOR.vertex_of_several_faces_has_one_contact(&[Mode::Face, Mode::Exact]);
+    PROCESSOR.vertex_of_several_faces_has_one_contact(&[Mode::face(), Mode::exact()]);
 }
 
 /// Two cubes whose edges are flush up to rounding, or up to less than the tolerance: at each corner
@@ -103,11 +103,7 @@ fn a_vertex_of_several_faces_has_one_contact() {
 fn the_corners_of_flush_faces_have_the_distance_of_the_planes() {
     let half = DVec3::splat(0.05);
     let lower = block(-half, half, 1);
-    let options = CollideOptions {
-        contacts_per: ContactsPer::Face,
-        contact_distance: 2e-4,
-        ..CollideOptions::default()
-    };
+    let options = CollideOptions { contact_distance: 2e-4, ..CollideOptions::default() };
     let mut random = Random(5);
     let mut signed = |size: f64| size * (2.0 * random.unit() - 1.0);
     for shift in [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-9] {

@@ -21,11 +21,12 @@ fn detect(scene: &Scene, options: &CollideOptions) -> Contacts {
 fn options(contact_distance: f64) -> Vec<CollideOptions> {
     let mut all = Vec::new();
     for cos_theta in [None, Some(0.5)] {
-        let base = CollideOptions { contact_distance, cos_theta, ..CollideOptions::default() };
+        let base = CollideOptions { contact_distance, ..CollideOptions::default() };
         all.push(CollideOptions { mode: Mode::Node, ..base });
-        for mode in [Mode::Face, Mode::Exact] {
+        for mode in [Mode::face(), Mode::exact()] {
             for contacts_per in [ContactsPer::Cell, ContactsPer::Face] {
-                all.push(CollideOptions { mode, contacts_per, ..base });
+                let mode = cos_theta.map_or(mode, |cos| mode.filtered(cos)).per(contacts_per);
+                all.push(CollideOptions { mode, ..base });
             }
         }
     }
@@ -50,7 +51,7 @@ fn compare(scene: &Scene, options: &CollideOptions) -> (usize, usize) {
     for count in [1, 7, 64, 1 << 30] {
         let reduction = Reduction::Spread(count);
         let found = detect(scene, &CollideOptions { reduction, ..*options });
-        let what = || format!("{:?} {:?}, {count}", options.mode, options.contacts_per);
+        let what = || format!("{:?}, {count}", options.mode);
         let s = found.statistics;
         assert_eq!(s.touching - s.filtered - s.reduced, found.len(), "{s:?}");
         assert_eq!(found.reductions.len(), pairs(found.as_slice()).len());
@@ -113,11 +114,9 @@ fn the_spread_contacts_of_a_nut_and_its_bolt_are_some_of_all() {
         let bodies =
             [Placed::new("iso_m16_bolt_6k", at(DVec3::ZERO)), Placed::new("iso_m16_nut_c100", at(shift))];
         let scene = scene(&bodies);
-        for mode in [Mode::Node, Mode::Face, Mode::Exact] {
-            let contacts_per = ContactsPer::Face;
+        for mode in [Mode::Node, Mode::face(), Mode::exact()] {
             let of_mode = CollideOptions::with_mode(mode);
-            let (all, _) =
-                compare(&scene, &CollideOptions { contact_distance: 2e-4, contacts_per, ..of_mode });
+            let (all, _) = compare(&scene, &CollideOptions { contact_distance: 2e-4, ..of_mode });
             assert!(all > 1000, "{all}");
         }
     }
@@ -197,10 +196,8 @@ fn many_pairs_have_the_same_contacts_on_any_number_of_threads() {
         let pose = Pose { translation: DVec3::ZERO, rotation };
         scene.add(Instance { world, ..Instance::new(floor, pose) }).expect("a pose");
     }
-    for mode in [Mode::Node, Mode::Exact] {
-        let contacts_per = ContactsPer::Face;
-        let options =
-            CollideOptions { contact_distance: 1e-3 * size, contacts_per, ..CollideOptions::with_mode(mode) };
+    for mode in [Mode::Node, Mode::exact()] {
+        let options = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(mode) };
         compare(&scene, &options);
         let options = CollideOptions { reduction: Reduction::Spread(5), ..options };
         let on = |threads| {
@@ -235,9 +232,8 @@ fn spread_contacts_take_searches_in_proportion_to_their_number() {
     let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
     let bodies = [Placed::new("iso_m16_bolt_6k", at), Placed::new("iso_m16_nut_c100", at)];
     let scene = scene(&bodies);
-    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
-        let contacts_per = ContactsPer::Face;
-        let base = CollideOptions { contact_distance: 2e-4, contacts_per, ..CollideOptions::with_mode(mode) };
+    for mode in [Mode::Node, Mode::face(), Mode::exact()] {
+        let base = CollideOptions { contact_distance: 2e-4, ..CollideOptions::with_mode(mode) };
         let all = detect(&scene, &base);
         for count in [1, 8, 64, 256] {
             let found = detect(&scene, &CollideOptions { reduction: Reduction::Spread(count), ..base });

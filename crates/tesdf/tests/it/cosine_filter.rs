@@ -53,8 +53,8 @@ impl Figure {
 
     /// Contacts of the probe's faces, and the number of contacts that were dropped in total.
     fn contacts(&self, mode: Mode, cos_theta: Option<f64>) -> (Vec<Contact>, usize) {
-        let contacts_per = ContactsPer::Cell;
-        let options = CollideOptions { cos_theta, contacts_per, ..CollideOptions::with_mode(mode) };
+        let mode = cos_theta.map_or(mode, |cos| mode.filtered(cos)).per(ContactsPer::Cell);
+        let options = CollideOptions::with_mode(mode);
         let found = detect(&self.scene, &options).expect("a good scene");
         let all = found.iter().filter(|c| c.instance_a == InstanceId(0)).copied().collect();
         (all, found.statistics.filtered)
@@ -75,7 +75,7 @@ fn gradients_that_face_away_are_dropped() {
     let figure = Figure::new();
     let n1 = DVec3::NEG_Z;
     let n2 = DVec3::new(0.8, 0.0, -1.2).normalize();
-    for mode in [Mode::Exact, Mode::Face] {
+    for mode in [Mode::exact(), Mode::face()] {
         let (all, filtered) = figure.contacts(mode, None);
         assert_eq!(filtered, 0);
         let points = |c: &Contact, way: f64| c.normal.z * way > 0.999;
@@ -104,11 +104,11 @@ fn gradients_that_face_away_are_dropped() {
 #[test]
 fn a_threshold_of_minus_one_keeps_all_contacts_and_one_only_opposite_gradients() {
     let figure = Figure::new();
-    let (all, _) = figure.contacts(Mode::Exact, None);
+    let (all, _) = figure.contacts(Mode::exact(), None);
     // ∇φ · n > 1 is never true, except for the rounding of two unit vectors.
-    let (kept, filtered) = figure.contacts(Mode::Exact, Some(-1.0));
+    let (kept, filtered) = figure.contacts(Mode::exact(), Some(-1.0));
     assert!(all.len() - kept.len() == 0 || filtered > 0 && all.len() - kept.len() < all.len() / 4);
-    let (strict, _) = figure.contacts(Mode::Exact, Some(1.0 - 1e-9));
+    let (strict, _) = figure.contacts(Mode::exact(), Some(1.0 - 1e-9));
     assert!(strict.iter().all(|c| c.normal.dot(figure.normal(c.face_a)) < -0.999_999));
     assert!(strict.len() < all.len());
 }

@@ -216,7 +216,7 @@ fn contacts_in_conforming_and_bisection_domains_agree() {
             (scene, beam)
         };
         for contact_distance in [0.0, 0.3] {
-            for mode in [Mode::Exact, Mode::Node] {
+            for mode in [Mode::exact(), Mode::Node] {
                 let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
                 for encoding in [self::options(), by_cost.clone()] {
                     let conforming = lowest(&scene_of(encoded(&solid, &domain, &encoding)).0, &options);

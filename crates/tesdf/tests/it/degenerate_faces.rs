@@ -67,7 +67,7 @@ fn depths(asset: &Arc<TeSdf>, top: f64) -> Vec<f64> {
     let probe = scene.add_shape(Body::Box { half_extents: DVec3::splat(0.25) }).expect("room");
     scene.add(Instance::new(body, Pose::IDENTITY)).expect("valid");
     scene.add(Instance::new(probe, Pose::at(DVec3::new(0.1, 0.2, top + 0.15)))).expect("valid");
-    let modes = [Mode::Node, Mode::Face, Mode::Exact];
+    let modes = [Mode::Node, Mode::face(), Mode::exact()];
     modes
         .into_iter()
         .map(|mode| {

@@ -207,7 +207,7 @@ fn poses_far_out_have_no_contacts_or_are_refused() {
                     continue;
                 }
             };
-            for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+            for mode in [Mode::Node, Mode::face(), Mode::exact()] {
                 assert!(detect(&scene, &CollideOptions::with_mode(mode)).unwrap().is_empty());
             }
             let ids: Vec<_> = scene.instances().map(|(id, _)| id).collect();

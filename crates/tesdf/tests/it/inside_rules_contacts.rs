@@ -204,9 +204,9 @@ fn the_cosine_filter_knows_the_outside_of_faces_that_have_both() {
             let shapes = [body, &small].map(|b| scene.add_shape(b.asset.clone()).expect("a shape"));
             let a = scene.add(Instance::new(shapes[0], poses[0])).expect("an instance");
             scene.add(Instance::new(shapes[1], poses[1])).expect("an instance");
-            let all = CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::default() };
+            let all = CollideOptions::with_mode(Mode::exact().per(ContactsPer::Cell));
             let cos = 0.3;
-            let filtered = CollideOptions { cos_theta: Some(cos), ..all };
+            let filtered = CollideOptions { mode: all.mode.filtered(cos), ..all };
             let [all, filtered] = [all, filtered].map(|o| detect(&scene, &o).expect("contacts"));
             for contact in all.iter().filter(|c| c.instance_a == a) {
                 let pose = &poses[0];
@@ -255,14 +255,9 @@ fn a_box_in_a_void_has_contacts_clearance_and_impact_of_formulas() {
         let impact = time_of_impact(&scene, moved, walls, right, Motion::Rest, &options);
         let impact = *impact.expect("an answer").impact().expect("an impact");
         assert!((impact.time - 0.05).abs() < 1e-5, "{impact:?}");
-        for mode in [Mode::Node, Mode::Face, Mode::Exact] {
-            let contacts_per = ContactsPer::Face;
-            let options = CollideOptions {
-                contact_distance: 0.06,
-                contacts_per,
-                cos_theta: Some(0.5),
-                ..CollideOptions::with_mode(mode)
-            };
+        for mode in [Mode::Node, Mode::face(), Mode::exact()] {
+            let options =
+                CollideOptions { contact_distance: 0.06, ..CollideOptions::with_mode(mode.filtered(0.5)) };
             let found = detect(&scene, &options).expect("contacts");
             let of_moved: Vec<_> = found.iter().filter(|c| c.instance_a == moved).collect();
             assert!(!of_moved.is_empty(), "{mode:?}");
@@ -272,7 +267,7 @@ fn a_box_in_a_void_has_contacts_clearance_and_impact_of_formulas() {
             }
             // The wall has its outside on the side of the body.
             let of_wall = found.iter().filter(|c| c.instance_a == walls && c.normal.x > 0.9).count();
-            assert!(of_wall > 0 || mode != Mode::Exact, "{mode:?}");
+            assert!(of_wall > 0 || mode != Mode::exact(), "{mode:?}");
         }
         // In the wall, the way out is back into the void.
         let at = DVec3::new(0.95, 0.5, 0.5);

@@ -84,13 +84,13 @@ fn a_box_in_the_hole_has_the_depth_of_formulas() {
         let at = Pose::at(DVec3::new(0.0, 0.0, z));
         let (scene, [a, b]) = scene_of([&cup, &small], [Pose::IDENTITY, at]);
         for contacts_per in [ContactsPer::Face, ContactsPer::Cell, ContactsPer::Minimum] {
-            for mode in [Mode::Exact, Mode::Face, Mode::Node] {
-                let options = CollideOptions { contacts_per, ..CollideOptions::with_mode(mode) };
+            for mode in [Mode::exact(), Mode::face(), Mode::Node] {
+                let options = CollideOptions::with_mode(mode.per(contacts_per));
                 let found = detect(&scene, &options).expect("contacts");
                 assert!(found.iter().all(|c| c.converged && c.instance_a == b), "{mode:?}");
                 let deepest = found.iter().map(|c| -c.distance).fold(f64::NEG_INFINITY, f64::max);
                 let expected = match mode {
-                    Mode::Exact | Mode::Face => bottom,
+                    Mode::Exact(_) | Mode::Face { .. } => bottom,
                     Mode::Node => side,
                 };
                 let is_right = expected.map_or(found.is_empty(), |d| (deepest - d).abs() < 2e-6);
@@ -131,7 +131,7 @@ fn ties_at_the_jump_are_either_side() {
     let (cup, small) = (cup(), box_of(0.4));
     for z in [0.7, 0.7 + 1e-15, 0.7 - 1e-13] {
         let (scene, [a, b]) = scene_of([&cup, &small], [Pose::IDENTITY, Pose::at(DVec3::Z * z)]);
-        for mode in [Mode::Exact, Mode::Face, Mode::Node] {
+        for mode in [Mode::exact(), Mode::face(), Mode::Node] {
             let found = detect(&scene, &CollideOptions::with_mode(mode)).expect("contacts");
             for contact in found.iter() {
                 assert!(contact.distance >= -0.5 - 1e-6 && contact.distance <= 0.0, "{contact:?}");
@@ -146,7 +146,7 @@ fn ties_at_the_jump_are_either_side() {
     // Corners on corners, edges on edges: both bodies in one pose.
     for body in [&small, &cup] {
         let (scene, _) = scene_of([&cup, body], [Pose::IDENTITY; 2]);
-        for mode in [Mode::Exact, Mode::Face, Mode::Node] {
+        for mode in [Mode::exact(), Mode::face(), Mode::Node] {
             detect(&scene, &CollideOptions::with_mode(mode)).expect("contacts");
         }
     }

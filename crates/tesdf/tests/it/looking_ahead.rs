@@ -203,12 +203,11 @@ fn each_part_looks_as_far_as_it_moves() {
                 scene.add(i).expect("an instance")
             })
             .collect();
-        let mode = [Mode::Node, Mode::Exact][case % 2];
+        let mode = [Mode::Node, Mode::exact()][case % 2];
         let reduction = [Reduction::None, Reduction::PerPair(1000)][case / 2 % 2];
         let options = CollideOptions {
             speculative_time: 0.2,
             contact_distance: 0.01,
-            cos_theta: None,
             reduction,
             ..CollideOptions::with_mode(mode)
         };

@@ -25,7 +25,8 @@ fn scene(blocks: &[Block; 2]) -> Scene {
 }
 
 fn contacts_per(blocks: &[Block; 2], mode: Mode, contacts_per: ContactsPer) -> Vec<Contact> {
-    let options = CollideOptions { contacts_per, contact_distance: 2e-3, ..CollideOptions::with_mode(mode) };
+    let options =
+        CollideOptions { contact_distance: 2e-3, ..CollideOptions::with_mode(mode.per(contacts_per)) };
     detect(&scene(blocks), &options).expect("contacts").into_vec()
 }
 
@@ -40,7 +41,7 @@ fn normals_are_in_the_cones_of_both_bodies() {
     for round in 0..400 {
         let gap = [0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, -1e-12, -1e-9][round % 8];
         let blocks = touching(&mut random, gap);
-        for mode in [Mode::Exact, Mode::Face] {
+        for mode in [Mode::exact(), Mode::face()] {
             // A result of Frank–Wolfe that is not proved may be anywhere.
             for c in contacts(&blocks, mode).into_iter().filter(|c| c.converged) {
                 let [a, b] = if c.instance_a == InstanceId(0) { blocks } else { [blocks[1], blocks[0]] };
@@ -107,7 +108,7 @@ fn a_box_on_its_edge_or_corner_is_pushed_along_the_normal_of_the_face() {
                     pose: Pose::at(DVec3::new(0.0, 0.0, -0.5)),
                 };
                 let pose = Pose { translation: DVec3::new(0.1, -0.05, height + gap), rotation: turn };
-                let found = contacts(&[floor, Block { kind, half, pose }], Mode::Exact);
+                let found = contacts(&[floor, Block { kind, half, pose }], Mode::exact());
                 assert!(!found.is_empty(), "{kind:?}, gap {gap}, tilt {tilt}");
                 for c in found {
                     let up = if c.instance_a == InstanceId(0) { -c.normal } else { c.normal };
@@ -126,7 +127,7 @@ fn no_two_contacts_are_at_one_place_with_one_normal() {
     let mut random = Random(11);
     for round in 0..60 {
         let blocks = touching(&mut random, [0.0, 1e-9, 1e-5][round % 3]);
-        let found = contacts(&blocks, Mode::Exact);
+        let found = contacts(&blocks, Mode::exact());
         for (k, c) in found.iter().enumerate() {
             for d in &found[k + 1..] {
                 let sign = if c.instance_a == d.instance_a { 1.0 } else { -1.0 };
@@ -154,9 +155,8 @@ fn a_ball_over_tiles_has_the_normal_of_their_plane() {
             let at = DVec3::new(random.between(-0.9, 0.9), random.between(-0.9, 0.9), 0.05 + gap);
             scene.add(Instance::new(ball, Pose::at(at))).expect("a pose");
             let options = CollideOptions {
-                contacts_per: ContactsPer::Minimum,
                 contact_distance: 0.01,
-                ..CollideOptions::default()
+                ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Minimum))
             };
             let found = detect(&scene, &options).expect("contacts");
             assert!(!found.is_empty());

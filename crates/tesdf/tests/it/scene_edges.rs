@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use crate::support::bodies::body;
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, Groups, Instance, InstanceId, Mode, Placement, Pose, Reduction, Scene,
-    Shape, ShapeId, Velocity, detect, detect_until,
+    CollideError, CollideOptions, ContactsPer, FaceOptions, Groups, Instance, InstanceId, Mode, Placement,
+    Pose, Reduction, Scene, Shape, ShapeId, Velocity, detect, detect_until,
 };
 use tesdf::glam::{DQuat, DVec3};
 
@@ -92,13 +92,19 @@ fn invalid_options_are_refused() {
         ("contact_distance", CollideOptions { contact_distance: -1e-9, ..good }),
         ("contact_distance", CollideOptions { contact_distance: f64::NAN, ..good }),
         ("speculative_time", CollideOptions { speculative_time: f64::INFINITY, ..good }),
-        ("cos_theta", CollideOptions { cos_theta: Some(1.5), ..good }),
-        ("cos_theta", CollideOptions { cos_theta: Some(f64::NAN), ..good }),
-        ("tolerance", CollideOptions { tolerance: Length::OfDiagonal(0.0), ..good }),
-        ("tolerance", CollideOptions { tolerance: Length::Absolute(f64::NAN), ..good }),
+        ("cos_theta", CollideOptions { mode: good.mode.filtered(1.5), ..good }),
+        ("cos_theta", CollideOptions { mode: good.mode.filtered(f64::NAN), ..good }),
+        ("tolerance", CollideOptions { mode: good.mode.within(Length::OfDiagonal(0.0)), ..good }),
+        ("tolerance", CollideOptions { mode: good.mode.within(Length::Absolute(f64::NAN)), ..good }),
         (
             "iterations",
-            CollideOptions { mode: Mode::Face, iterations: CollideOptions::MAX_ITERATIONS + 1, ..good },
+            CollideOptions {
+                mode: Mode::Face {
+                    iterations: CollideOptions::MAX_ITERATIONS + 1,
+                    faces: FaceOptions::default(),
+                },
+                ..good
+            },
         ),
         ("reduction", CollideOptions { reduction: Reduction::PerPair(0), ..good }),
     ] {
@@ -109,12 +115,34 @@ fn invalid_options_are_refused() {
 
 #[test]
 fn options_that_a_text_leaves_out_have_their_defaults() {
-    let read = |text| serde_json::from_str::<CollideOptions>(text).expect("options");
+    let read = |text: &str| serde_json::from_str::<CollideOptions>(text).expect("options");
     assert_eq!(read("{}"), CollideOptions::default());
     let nodes = CollideOptions { mode: Mode::Node, contact_distance: 0.5, ..CollideOptions::default() };
     assert_eq!(read(r#"{ "mode": "node", "contact_distance": 0.5 }"#), nodes);
-    let written = serde_json::to_string(&nodes).expect("a text");
-    assert_eq!(read(&written), nodes);
+    let of_faces = [
+        Mode::exact().per(ContactsPer::Minimum),
+        Mode::PAPER.within(Length::Absolute(1e-3)),
+        Mode::Face { iterations: 3, faces: FaceOptions::OF_SIMULATION },
+    ];
+    for options in of_faces.map(CollideOptions::with_mode).into_iter().chain([nodes]) {
+        let written = serde_json::to_string(&options).expect("a text");
+        assert_eq!(read(&written), options, "{written}");
+    }
+}
+
+#[test]
+fn a_text_with_an_option_that_the_mode_does_not_use_is_refused() {
+    for (text, option, modes) in [
+        (r#"{ "mode": "node", "contacts_per": "cell" }"#, "contacts_per", "`face` and `exact`"),
+        (r#"{ "mode": "node", "tolerance": { "absolute": 1e-3 } }"#, "tolerance", "`face` and `exact`"),
+        (r#"{ "mode": "node", "cos_theta": 0.5 }"#, "cos_theta", "`face` and `exact`"),
+        (r#"{ "mode": "exact", "iterations": 16 }"#, "iterations", "`face`"),
+        (r#"{ "iterations": 16 }"#, "iterations", "`face`"),
+    ] {
+        let error = serde_json::from_str::<CollideOptions>(text).expect_err(text).to_string();
+        let says = format!("{option} has no effect in the mode");
+        assert!(error.starts_with(&says) && error.contains(&format!("only in {modes}")), "{error}");
+    }
 }
 
 #[test]
@@ -141,7 +169,7 @@ fn contact_distance_of_zero() {
     let mut scene = Scene::new();
     let shape = scene.add_shape(cube.asset.clone()).expect("a mesh");
     scene.add_many(&[Instance::new(shape, at(0.0)), Instance::new(shape, at(edge))]).expect("poses");
-    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+    for mode in [Mode::Node, Mode::face(), Mode::exact()] {
         let found = detect(&scene, &CollideOptions::with_mode(mode)).expect("a good scene");
         let least = found.iter().map(|c| c.distance).fold(0.0, f64::min);
         assert!(found.len() >= 4 && least > -1e-9 * edge, "{mode:?}: {least}");

@@ -81,7 +81,7 @@ fn touch(blocks: &[Block; 2], mode: Mode, kinds: [usize; 2]) {
         assert_eq!(features.map(kind), kinds, "{mode:?}: {blocks:?} {c:?}");
     }
     let names = |first: u32| of(first).map(|(_, features)| *features).collect::<Vec<_>>();
-    if mode == Mode::Exact {
+    if mode == Mode::exact() {
         let [one, other] = [0, 1].map(names);
         assert!(!one.is_empty() && !other.is_empty(), "{blocks:?}");
         // Coplanar triangles of a face have names of their own.
@@ -105,7 +105,7 @@ fn features_have_the_same_names_in_both_orders() {
                 let lowest = turn * (HALF * -(turn.inverse() * DVec3::Z).signum());
                 let at = DVec3::new(0.5, -0.1, height + gap) - lowest.with_z(0.0);
                 let on_corner = Block { kind, half: HALF, pose: Pose { translation: at, rotation: turn } };
-                for mode in [Mode::Exact, Mode::Node] {
+                for mode in [Mode::exact(), Mode::Node] {
                     touch(&[floor(kind), on_corner], mode, [2, 0]);
                     touch(&[on_corner, floor(kind)], mode, [0, 2]);
                 }
@@ -128,8 +128,8 @@ fn features_have_the_same_names_in_both_orders() {
                 };
                 let aside = (of(&below, 1.0) - of(&above, -1.0)).with_z(top + bottom + gap);
                 let above = Block { pose: Pose { translation: aside, ..above.pose }, ..above };
-                touch(&[below, above], Mode::Exact, [1, 1]);
-                touch(&[above, below], Mode::Exact, [1, 1]);
+                touch(&[below, above], Mode::exact(), [1, 1]);
+                touch(&[above, below], Mode::exact(), [1, 1]);
             }
         }
     }
@@ -140,7 +140,7 @@ fn contacts_of_another_scene_are_refused() {
     let blocks = [Kind::Mesh, Kind::Formula].map(|kind| Block { kind, half: HALF, pose: Pose::IDENTITY });
     let [below, above] = blocks;
     let above = Block { pose: Pose::at(2.0 * HALF.z * DVec3::Z), ..above };
-    let (contact, _) = named(&[below, above], Mode::Exact)[0];
+    let (contact, _) = named(&[below, above], Mode::exact())[0];
     assert_eq!(
         contact.touching_features(&Scene::new()).expect_err("no instance"),
         CollideError::NoInstance(contact.instance_a)

@@ -2,6 +2,7 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
+use tesdf::base::Named as _;
 use tesdf_sim::criterion::{SeparationCriterion, SeparationReport, SeparationTracker, Tracker};
 use tesdf_sim::scene_file::DetectorMode;
 use tesdf_sim::{HiddenPair, RunRecord, Summary};
@@ -64,15 +65,6 @@ struct Row {
 
 const MODES: [DetectorMode; 3] = [DetectorMode::Exact, DetectorMode::Face, DetectorMode::Node];
 
-fn name(mode: DetectorMode) -> &'static str {
-    match mode {
-        DetectorMode::Exact => "exact",
-        DetectorMode::Face => "face",
-        DetectorMode::Node => "node",
-        DetectorMode::Off => "off",
-    }
-}
-
 impl Row {
     fn new(
         shaft: &Shaft,
@@ -106,12 +98,12 @@ impl Row {
 
     /// Mode, E_max and domain.
     fn title(&self) -> String {
-        format!("{}, {}, {}", name(self.mode), e_max(self.max_entries), self.domain)
+        format!("{}, {}, {}", self.mode, e_max(self.max_entries), self.domain)
     }
 
     fn file_name(&self) -> String {
         let domain = self.domain.to_lowercase();
-        format!("pile-{domain}-{}-{}.tesrun", name(self.mode), e_max(self.max_entries))
+        format!("pile-{domain}-{}-{}.tesrun", self.mode, e_max(self.max_entries))
     }
 }
 
@@ -200,7 +192,7 @@ fn csv(figure: &Figure) -> Text {
     let line = |row: &Row, (frame, depth): (usize, &f64)| {
         vec![
             row.domain.clone(),
-            name(row.mode).into(),
+            row.mode.name().into(),
             e_max(row.max_entries),
             row.success.to_string(),
             frame.to_string(),
@@ -243,7 +235,7 @@ fn markdown(figure: &Figure) -> String {
         vec![
             (k + 1).to_string(),
             row.domain.clone(),
-            name(row.mode).into(),
+            row.mode.name().into(),
             e_max(row.max_entries),
             row.longest_list.to_string(),
             row.verdict().into(),

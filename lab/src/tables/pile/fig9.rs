@@ -2,7 +2,7 @@
 use std::time::Instant;
 
 use serde::Serialize;
-use tesdf::collide::{CollideOptions, ContactsPer, Mode, Pose, detect};
+use tesdf::collide::{CollideOptions, Mode, Pose, detect};
 use tesdf_sim::scene_file::DetectorMode;
 use tesdf_sim::{RunRecord, System};
 
@@ -112,12 +112,7 @@ impl Setting {
 
 /// Face-TES with the paper's parameters.
 fn face_tes() -> CollideOptions {
-    CollideOptions {
-        contacts_per: ContactsPer::Cell,
-        iterations: 16,
-        cos_theta: Some(0.3),
-        ..CollideOptions::with_mode(Mode::Face)
-    }
+    CollideOptions::with_mode(Mode::PAPER)
 }
 
 impl Args {

@@ -81,21 +81,11 @@ const NORMAL_BYTES: usize = 32;
 
 /// Face-TES as in Sec. VII-B of the paper.
 fn face_tes(contact_distance: f64) -> CollideOptions {
-    CollideOptions {
-        contact_distance,
-        contacts_per: ContactsPer::Cell,
-        iterations: 16,
-        cos_theta: Some(0.3),
-        ..CollideOptions::with_mode(Mode::Face)
-    }
+    CollideOptions { contact_distance, ..CollideOptions::with_mode(Mode::PAPER) }
 }
 
 fn per_face(contact_distance: f64) -> CollideOptions {
-    CollideOptions {
-        contact_distance,
-        contacts_per: ContactsPer::Minimum,
-        ..CollideOptions::with_mode(Mode::Exact)
-    }
+    CollideOptions { contact_distance, ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Minimum)) }
 }
 
 /// Encodes the meshes of a scenario, and detects its contacts in all frames.
@@ -110,7 +100,7 @@ pub fn row(
     bar: &Bar,
 ) -> Result<Row, Failure> {
     bar.stage("encoding");
-    let options = EncodeOptions { max_entries, ..args.preset.options() };
+    let options = EncodeOptions { max_entries, ..EncodeOptions::preset(args.preset) };
     let mut frames = Frames::read(file, args.frames(), 1, &options)?;
     bar.stage("detecting");
     let repeat = args.repeat();

@@ -4,14 +4,16 @@ mod measure;
 mod text;
 
 use std::path::PathBuf;
+use tesdf::base::Named as _;
+use tesdf_cli::terminal::parse;
 
 use serde::Serialize;
 
 use super::OutputArgs;
 use super::output::Sink;
 use super::paper::{TABLE_2, Table2};
-use crate::preset::Preset;
 use measure::Row;
+use tesdf::encode::Preset;
 use tesdf_cli::terminal::device::{self, Choice};
 use tesdf_cli::terminal::progress::Bar;
 use tesdf_cli::terminal::report::{Failure, note};
@@ -33,7 +35,7 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeat: Option<u32>,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Compact)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Compact)]
     pub preset: Preset,
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("contacts are found"))]

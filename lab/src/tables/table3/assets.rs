@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tesdf::encode::Encoder;
 use tesdf::mesh::SolidMesh;
-use tesdf_parts::{LobedHole, Nut, Resolution, Size};
 use tesdf_cli::terminal::mesh_file;
 use tesdf_cli::terminal::report::Failure;
+use tesdf_parts::{LobedHole, Nut, Resolution, Size};
 
 use super::Scenario;
-use crate::preset::Preset;
+use tesdf::encode::Preset;
 
 /// Encodes meshes into files, which are removed in the end.
 pub struct Assets {
@@ -68,8 +68,7 @@ impl Assets {
     ) -> Result<PathBuf, Failure> {
         let path = self.folder.path().join(name).with_extension("tesdf");
         if !path.exists() {
-            let asset =
-                Encoder::new().options(self.preset.options()).encode(&solid()?).map_err(Failure::new)?;
+            let asset = Encoder::new().preset(self.preset).encode(&solid()?).map_err(Failure::new)?;
             asset.save(&path).map_err(Failure::new)?;
         }
         Ok(path)

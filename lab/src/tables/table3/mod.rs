@@ -8,6 +8,8 @@ mod text;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use tesdf::base::Named as _;
+use tesdf_cli::terminal::parse;
 
 use serde::Serialize;
 use tesdf_sim::scene_file::LoadedScene;
@@ -15,12 +17,12 @@ use tesdf_sim::scene_file::LoadedScene;
 use super::OutputArgs;
 use super::detector::Shared;
 use super::output::Sink;
-use crate::preset::Preset;
 use crate::voxel::VoxelDetector;
 use assets::Assets;
 use cell::{Cell, Setup};
 use memory::{Encoded, Grids, Voxels, geometries};
 pub use scenario::Scenario;
+use tesdf::encode::Preset;
 use tesdf_cli::terminal::device::{self, Choice};
 use tesdf_cli::terminal::progress::Bar;
 use tesdf_cli::terminal::report::{Failure, note};
@@ -46,7 +48,7 @@ pub struct Args {
     #[arg(long, value_enum, value_delimiter = ',')]
     pub features: Option<Vec<Features>>,
     /// Preset of the encoder
-    #[arg(long, value_enum, default_value_t = Preset::Compact)]
+    #[arg(long, value_parser = parse::named::<Preset>(), default_value_t = Preset::Compact)]
     pub preset: Preset,
     /// Where contacts with encoded meshes are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("contacts with encoded meshes are found"))]

@@ -139,8 +139,8 @@ impl Scenario {
 /// Sets the features and the time step, ms.
 pub fn set(loaded: &mut LoadedScene, features: Features, time_step: f64) {
     loaded.scene.time_step = time_step * 1e-3;
-    loaded.scene.detector.mode = match features {
+    loaded.scene.detector.choose(match features {
         Features::Node => DetectorMode::Node,
         Features::Face => DetectorMode::Face,
-    };
+    });
 }

@@ -133,7 +133,11 @@ fn reach(scene: &Scene, options: &CollideOptions, &(a, b, part): &(InstanceId, I
 /// distance: the filter depends on a normal, and Frank–Wolfe may step another way. Such parts count
 /// as others.
 fn may_be_lost(options: &CollideOptions) -> bool {
-    options.cos_theta.is_some() || options.mode == Mode::Face
+    has_filter(options) || matches!(options.mode, Mode::Face { .. })
+}
+
+fn has_filter(options: &CollideOptions) -> bool {
+    options.mode.faces().is_some_and(|faces| faces.cos_theta.is_some())
 }
 
 /// The number of touching parts, and of those with different results on device and host.
@@ -178,7 +182,7 @@ pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
 /// Compares the given contacts of a device with all contacts of a scene on the host.
 pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: &Contacts) -> Compared {
     let host = detect(scene, options).expect("a good scene");
-    if options.contacts_per == ContactsPer::Face && options.mode != Mode::Node {
+    if options.mode.contacts_per() == Some(ContactsPer::Face) {
         return faces_hold(scene, options, size, [&host, device]);
     }
     let (on_host, on_device) = (least(host.as_slice()), least(device.as_slice()));
@@ -228,10 +232,7 @@ fn faces_hold(scene: &Scene, options: &CollideOptions, size: f64, sides: [&Conta
         match (h, d) {
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
             _ => {
-                assert!(
-                    options.cos_theta.is_some() || is_close(),
-                    "{key:?}: {h:?} on the host, {d:?} on the device"
-                );
+                assert!(has_filter(options) || is_close(), "{key:?}: {h:?} on the host, {d:?} on the device");
                 others += 1;
             }
         }
@@ -278,17 +279,18 @@ impl Corners {
 
 /// Options with a contact for each cell that a face meets.
 pub fn per_cell(mode: Mode) -> CollideOptions {
-    CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(mode) }
+    CollideOptions::with_mode(mode.per(ContactsPer::Cell))
 }
 
 /// All modes of detection, for bodies of diagonal `size`: with contacts per cell, then per face.
 pub fn each_mode(size: f64) -> [CollideOptions; 6] {
-    let face = CollideOptions { contact_distance: 1e-3 * size, ..per_cell(Mode::Face) };
-    let exact = CollideOptions { mode: Mode::Exact, ..face };
-    let per_face = |options| CollideOptions { contacts_per: ContactsPer::Face, ..options };
+    let face = CollideOptions { contact_distance: 1e-3 * size, ..per_cell(Mode::face()) };
+    let exact = CollideOptions { mode: Mode::exact().per(ContactsPer::Cell), ..face };
+    let per_face =
+        |options: CollideOptions| CollideOptions { mode: options.mode.per(ContactsPer::Face), ..options };
     [
         CollideOptions { mode: Mode::Node, ..face },
-        CollideOptions { cos_theta: Some(0.3), ..face },
+        CollideOptions { mode: face.mode.filtered(0.3), ..face },
         face,
         exact,
         per_face(face),

@@ -7,7 +7,7 @@ use crate::asset::layout::TreeChild;
 use crate::collide::bodies::branch::Branch;
 use crate::collide::bodies::field::{Field, FieldBody};
 use crate::collide::bodies::reach::Reach;
-use crate::collide::options::Mode;
+use crate::collide::mode::Mode;
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
 use crate::collide::scene::simple::{Points, Simple, plane_square};

@@ -1,7 +1,7 @@
 //! Contacts that were found elsewhere, as on a GPU, and contacts that both orders of a pair find.
 use super::Cones;
 use super::cone::{PARALLEL, SAME};
-use crate::collide::options::{CollideOptions, ContactsPer};
+use crate::collide::mode::{ContactsPer, FaceOptions};
 use crate::collide::report::contact::Contact;
 use crate::collide::scene::Scene;
 use crate::collide::scene::error::CollideError;
@@ -10,13 +10,14 @@ use crate::query::Precision;
 
 /// Contacts of faces that were found elsewhere with the precision `f32`, with the normals of their
 /// cones. `faces` are the indices of their faces in both shapes, and the contacts are in the order
-/// of a detection. Per local minimum, those that have no normal and twins are left out.
+/// of a detection with these options. Per local minimum, those that have no normal and twins are
+/// left out.
 ///
 /// # Errors
 /// [`CollideError::NoInstance`] for an instance that the scene lacks.
 pub fn in_cones(
     scene: &Scene,
-    options: &CollideOptions,
+    options: &FaceOptions,
     contacts: &[Contact],
     faces: &[[u32; 2]],
 ) -> Result<Vec<Contact>, CollideError> {

@@ -15,7 +15,7 @@ mod elsewhere;
 use glam::DVec3;
 
 use crate::collide::bodies::field::ROUNDING;
-use crate::collide::options::ContactsPer;
+use crate::collide::mode::ContactsPer;
 use crate::collide::report::contact::Contact;
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;

@@ -2,7 +2,8 @@
 use crate::parallel::*;
 
 use crate::collide::detect::ordered_pair::OrderedPair;
-use crate::collide::options::{CollideOptions, ContactsPer, Mode, Reduction};
+use crate::collide::mode::Mode;
+use crate::collide::options::{CollideOptions, Reduction};
 use crate::collide::scene::Scene;
 use crate::collide::scene::error::CollideError;
 use crate::collide::scene::ids::InstanceId;
@@ -33,13 +34,7 @@ pub struct CoarseContact {
 /// # Errors
 /// As [`detect`](crate::collide::detect()).
 pub fn coarse_contacts(scene: &Scene, options: &CollideOptions) -> Result<Vec<CoarseContact>, CollideError> {
-    let options = CollideOptions {
-        mode: Mode::Exact,
-        contacts_per: ContactsPer::Face,
-        cos_theta: None,
-        reduction: Reduction::None,
-        ..*options
-    };
+    let options = CollideOptions { mode: Mode::exact(), reduction: Reduction::None, ..*options };
     let pairs = OrderedPair::all(scene, &options)?;
     Ok(pairs.par_iter().filter_map(of_pair).collect())
 }

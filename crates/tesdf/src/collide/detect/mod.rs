@@ -17,7 +17,8 @@ use crate::collide::bodies::surface::Candidates;
 use crate::collide::cones::{Cones, keep_different};
 use crate::collide::detect::candidate_contacts::{AtVertex, Found, contacts, one_per_vertex, order};
 use crate::collide::detect::ordered_pair::OrderedPair;
-use crate::collide::options::{CollideOptions, ContactsPer, Reduction};
+use crate::collide::mode::ContactsPer;
+use crate::collide::options::{CollideOptions, Reduction};
 use crate::collide::pairs::InstancePair;
 use crate::collide::pairs::kept::InstancePairs;
 use crate::collide::report::contact::{Contact, Contacts, Statistics};
@@ -205,7 +206,7 @@ fn of_pairs_by(
     contacts
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
         .for_each(|run| run.sort_by_key(order));
-    if options.contacts_per == ContactsPer::Minimum {
+    if options.mode.contacts_per() == Some(ContactsPer::Minimum) {
         let found = contacts.len();
         contacts = different(contacts, pairs);
         statistics.filtered += found - contacts.len();

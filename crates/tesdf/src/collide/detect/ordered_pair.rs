@@ -7,8 +7,9 @@ use crate::collide::bodies::reach::Reach;
 use crate::collide::bodies::surface::{Candidates, Part, SurfaceBody};
 use crate::collide::cones::Cones;
 use crate::collide::detect::descent::{OnFace, descends};
+use crate::collide::mode::{ContactsPer, FaceOptions, Mode};
 use crate::collide::narrow::{Minimum, Search};
-use crate::collide::options::{CollideOptions, ContactsPer, Mode};
+use crate::collide::options::CollideOptions;
 use crate::collide::pairs::ahead::Ahead;
 use crate::collide::pairs::{InstancePair, instance_pairs};
 use crate::collide::report::contact::{Contact, FeatureId};
@@ -105,9 +106,8 @@ impl<'a> OrderedPair<'a> {
         let [ahead_a, ahead_b] = Ahead::of_both(scene, [a, b], options.speculative_time)?;
         let least = options.contact_distance.min(contact_distance);
         let reach = Reach::new(&ahead_a.approach(&ahead_b), &field, contact_distance, least);
-        let is_of_faces = matches!(options.mode, Mode::Face | Mode::Exact);
-        let cones = is_of_faces.then(|| {
-            let tolerance = options.tolerance.resolve(diagonals[1]);
+        let cones = options.mode.faces().map(|faces| {
+            let tolerance = faces.tolerance.resolve(diagonals[1]);
             let shapes = [(shape_a, of_a.placement()), (shape_b, of_b.placement())];
             Cones::new(shapes, tolerance, options.precision)
         });
@@ -121,10 +121,10 @@ impl<'a> OrderedPair<'a> {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, &self.reach),
             // The search over a face begins with the test by which `faces` drops it.
-            Mode::Face | Mode::Exact if self.search.is_of_faces() => {
+            Mode::Face { .. } | Mode::Exact(_) if self.search.is_of_faces() => {
                 self.surface.faces_of_leaves(&self.field, &self.reach)
             }
-            Mode::Face | Mode::Exact => self.surface.faces(&self.field, &self.reach),
+            Mode::Face { .. } | Mode::Exact(_) => self.surface.faces(&self.field, &self.reach),
         }
     }
 
@@ -143,7 +143,7 @@ impl<'a> OrderedPair<'a> {
     pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
         match self.options.mode {
             Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
-            Mode::Face | Mode::Exact => {
+            Mode::Face { .. } | Mode::Exact(_) => {
                 let face = self.surface.face_id(candidate);
                 (self.surface.face(candidate, &self.field, self.reach.most), face, face)
             }
@@ -164,9 +164,11 @@ impl<'a> OrderedPair<'a> {
             Some(normal) if normal.dot(part.normal) > 0.0 => return (minimum, cosine),
             Some(normal) => normal,
         };
-        let value = match self.options.contacts_per {
-            ContactsPer::Cell => minimum.value,
-            _ => self.field.opposing(minimum.point, turned, self.options.precision),
+        let value = match self.options.mode.contacts_per() {
+            Some(ContactsPer::Cell) | None => minimum.value,
+            Some(ContactsPer::Face | ContactsPer::Minimum) => {
+                self.field.opposing(minimum.point, turned, self.options.precision)
+            }
         };
         (Minimum { value, ..minimum }, value.gradient.dot(turned))
     }
@@ -185,21 +187,29 @@ impl<'a> OrderedPair<'a> {
         cosine: f64,
         ids: [u32; 2],
     ) -> Result<Contact, Dropped> {
-        match self.options.mode {
-            Mode::Node => {}
-            Mode::Face | Mode::Exact => self.check_face(part, candidate, minimum, cosine)?,
+        if let Some(faces) = self.options.mode.faces() {
+            self.check_face(faces, part, candidate, minimum, cosine)?;
         }
         let contact = self.touching(part, minimum, ids);
-        let Some(cones) = &self.cones else { return Ok(contact) };
+        let (Some(cones), Some(per)) = (&self.cones, self.options.mode.contacts_per()) else {
+            return Ok(contact);
+        };
         let faces = [candidate, minimum.value.position];
-        cones.contact(contact, faces, self.options.contacts_per).ok_or(Dropped::OutOfCones)
+        cones.contact(contact, faces, per).ok_or(Dropped::OutOfCones)
     }
 
-    fn check_face(&self, part: &Part, candidate: u32, minimum: &Minimum, cosine: f64) -> Result<(), Dropped> {
+    fn check_face(
+        &self,
+        options: &FaceOptions,
+        part: &Part,
+        candidate: u32,
+        minimum: &Minimum,
+        cosine: f64,
+    ) -> Result<(), Dropped> {
         let gradient = minimum.value.gradient;
         if part.points().len() == 3
             && !self.surface.is_sheet()
-            && self.options.cos_theta.is_some_and(|cos| cosine > -cos)
+            && options.cos_theta.is_some_and(|cos| cosine > -cos)
         {
             return Err(Dropped::ByCosine(cosine));
         }
@@ -211,7 +221,7 @@ impl<'a> OrderedPair<'a> {
             };
             OnFace { face: candidate, point, distance, gradient, is_lowest }
         };
-        match self.options.contacts_per == ContactsPer::Minimum && self.descends(&at()) {
+        match options.contacts_per == ContactsPer::Minimum && self.descends(&at()) {
             true => Err(Dropped::Descending),
             false => Ok(()),
         }
@@ -227,8 +237,10 @@ impl<'a> OrderedPair<'a> {
                 let reach = self.reach.of(&face.corners, around) + around;
                 match self.options.mode {
                     // Frank–Wolfe need not find the lower point.
-                    Mode::Face => self.search.within(reach).frank_wolfe(&self.field, face) < at.distance,
-                    Mode::Node | Mode::Exact => at.distance <= reach,
+                    Mode::Face { iterations, .. } => {
+                        self.search.within(reach).frank_wolfe(&self.field, face, iterations) < at.distance
+                    }
+                    Mode::Node | Mode::Exact(_) => at.distance <= reach,
                 }
             })
     }
@@ -236,8 +248,7 @@ impl<'a> OrderedPair<'a> {
     /// The vertex at which a minimum is, by its bits; `None` in the mode node, where each
     /// vertex has one contact, and for contacts per cell.
     pub fn vertex(&self, part: &Part, minimum: &Minimum) -> Option<[u64; 3]> {
-        let one_each = self.options.mode == Mode::Node || self.options.contacts_per == ContactsPer::Cell;
-        let corner = minimum.corner.filter(|_| !one_each)?;
+        let corner = minimum.corner.filter(|_| self.search.is_of_faces())?;
         Some(part.points()[usize::from(corner)].to_array().map(f64::to_bits))
     }
 

@@ -5,8 +5,9 @@ use serde::Serialize;
 
 use crate::collide::bodies::clip::ClippedPolygon;
 use crate::collide::detect::ordered_pair::{Dropped, OrderedPair};
+use crate::collide::mode::Mode;
 use crate::collide::narrow::Minimum;
-use crate::collide::options::{CollideOptions, Mode};
+use crate::collide::options::CollideOptions;
 use crate::collide::scene::Scene;
 use crate::collide::scene::error::CollideError;
 use crate::collide::scene::ids::InstanceId;
@@ -209,7 +210,7 @@ impl Stages<'_> {
         let surface = &self.pair.surface;
         match self.options.mode {
             Mode::Node => surface.node_count() as usize,
-            Mode::Face | Mode::Exact => surface.face_count() as usize,
+            Mode::Face { .. } | Mode::Exact(_) => surface.face_count() as usize,
         }
     }
 
@@ -218,12 +219,14 @@ impl Stages<'_> {
         let total = self.total() as u32;
         let found: Vec<u32> = match self.options.mode {
             Mode::Node => (0..total).filter(|&node| node == id).collect(),
-            Mode::Face | Mode::Exact => (0..total).filter(|&f| self.pair.surface.face_id(f) == id).collect(),
+            Mode::Face { .. } | Mode::Exact(_) => {
+                (0..total).filter(|&f| self.pair.surface.face_id(f) == id).collect()
+            }
         };
         if found.is_empty() {
             let (option, expected) = match self.options.mode {
                 Mode::Node => ("node", "a node of the body, counted from 0"),
-                Mode::Face | Mode::Exact => {
+                Mode::Face { .. } | Mode::Exact(_) => {
                     ("face", "a face of the body, counted from 0 as in the encoded mesh")
                 }
             };

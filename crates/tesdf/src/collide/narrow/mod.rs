@@ -11,7 +11,8 @@ use crate::collide::bodies::clip::{self, ClippedPolygon};
 use crate::collide::bodies::field::{CellField, Field, FieldBody, ROUNDING, TIE};
 use crate::collide::bodies::polygon::Polygon;
 use crate::collide::bodies::surface::Part;
-use crate::collide::options::{CollideOptions, ContactsPer, Mode};
+use crate::collide::mode::{ContactsPer, Mode};
+use crate::collide::options::CollideOptions;
 use crate::collide::scene::field_value::FieldValue;
 use crate::geometry::{Aabb, Triangle};
 use crate::query::{Faces, Place, Precision, Surroundings};
@@ -47,8 +48,6 @@ struct Lowest {
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
     mode: Mode,
-    per: ContactsPer,
-    iterations: u32,
     /// A part with a longer edge is large against a body (field's frame).
     large: f64,
     /// Signed distances above this are ignored.
@@ -71,10 +70,11 @@ impl Search {
     /// body. All in the world's unit.
     pub fn new(options: &CollideOptions, reach: f64, field: &FieldBody, diagonals: [f64; 2]) -> Self {
         let unit = field.unit();
-        let tolerance = options.tolerance.resolve(diagonals[1]) / unit;
+        let of_faces = options.mode.faces().copied().unwrap_or_default();
+        let tolerance = of_faces.tolerance.resolve(diagonals[1]) / unit;
         let large = LARGE * diagonals[0].min(diagonals[1]) / unit;
-        let CollideOptions { mode, contacts_per: per, iterations, precision, .. } = *options;
-        Self { mode, per, iterations, large, reach: reach / unit, tolerance, precision }
+        let CollideOptions { mode, precision, .. } = *options;
+        Self { mode, large, reach: reach / unit, tolerance, precision }
     }
 
     /// The same search up to another signed distance (field's frame).
@@ -106,7 +106,7 @@ impl Search {
 
     /// Whether parts are searched as a whole, not cell by cell.
     pub fn is_of_faces(&self) -> bool {
-        self.per != ContactsPer::Cell && self.mode != Mode::Node
+        matches!(self.mode.contacts_per(), Some(ContactsPer::Face | ContactsPer::Minimum))
     }
 
     /// The mesh around parts that lie near each other, for [`minima`](Self::minima). `None` where
@@ -170,10 +170,11 @@ impl Search {
         });
     }
 
-    /// The least signed distance over a whole face that Frank–Wolfe finds; infinite beyond reach.
-    pub fn frank_wolfe(&self, field: &FieldBody, face: &Triangle) -> f64 {
+    /// The least signed distance over a whole face that Frank–Wolfe finds in this number of
+    /// iterations; infinite beyond reach.
+    pub fn frank_wolfe(&self, field: &FieldBody, face: &Triangle, iterations: u32) -> f64 {
         let least = |cell: &CellField| {
-            let lowest = frank_wolfe::lowest(cell, &Polygon::new(&face.corners), self.iterations, self.reach);
+            let lowest = frank_wolfe::lowest(cell, &Polygon::new(&face.corners), iterations, self.reach);
             lowest.map_or(f64::INFINITY, |lowest| cell.value(lowest.point, self.precision).distance)
         };
         match field.field {
@@ -231,8 +232,10 @@ impl Search {
             }
             Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None }),
             // Steps along the gradient do not see what is beyond a jump.
-            Mode::Face if cell.jump().is_none() => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
-            Mode::Face | Mode::Exact => self.exact(cell, polygon, part, reach),
+            Mode::Face { iterations, .. } if cell.jump().is_none() => {
+                frank_wolfe::lowest(cell, polygon, iterations, reach)
+            }
+            Mode::Face { .. } | Mode::Exact(_) => self.exact(cell, polygon, part, reach),
         }?;
         let Lowest { point, converged, face } = lowest;
         let normal = part.normal;
@@ -242,14 +245,14 @@ impl Search {
             }
             _ => None,
         };
-        let value = match (outside, self.per) {
+        let value = match (outside, self.mode.contacts_per()) {
             (Some(value), _) => value,
-            (None, ContactsPer::Cell) => cell.value(point, self.precision),
+            (None, Some(ContactsPer::Cell)) => cell.value(point, self.precision),
             (None, _) => cell.opposing(point, normal, self.precision),
         };
         let value = Some(value).filter(|value| value.distance <= reach)?;
         let converged = match self.mode {
-            Mode::Face if polygon.vertices().len() > 1 && cell.jump().is_none() => {
+            Mode::Face { .. } if polygon.vertices().len() > 1 && cell.jump().is_none() => {
                 let least = match self.precision {
                     Precision::F64 => value,
                     Precision::F32 => cell.value(point, Precision::F64),
@@ -258,8 +261,8 @@ impl Search {
             }
             _ => converged,
         };
-        let value = match (outside, self.per) {
-            (Some(value), ContactsPer::Face | ContactsPer::Minimum) => {
+        let value = match (outside, self.mode.contacts_per()) {
+            (Some(value), Some(ContactsPer::Face | ContactsPer::Minimum)) => {
                 cell.most_opposing(point, normal, TIE, value, self.precision)
             }
             _ => value,

@@ -72,6 +72,18 @@ pub enum CollideError {
         /// The expected value.
         expected: &'static str,
     },
+    /// An option that the mode does not use.
+    #[error(
+        "{option} has no effect in the mode `{mode}`, only in {modes}; leave it out, or choose such a mode"
+    )]
+    NotOfMode {
+        /// Name of the option.
+        option: &'static str,
+        /// Name of the mode.
+        mode: &'static str,
+        /// The modes that use the option.
+        modes: &'static str,
+    },
     /// Another thread asked the detection to stop.
     #[error("the detection was stopped")]
     Stopped,

@@ -120,12 +120,11 @@ pub fn edges_are_pushed_along_the_normal_of_the_floor(
             }
         }
     }
-    for mode in [Mode::Exact, Mode::Face] {
+    for mode in [Mode::exact(), Mode::face()] {
         for &contacts_per in kinds {
             let options = CollideOptions {
-                contacts_per,
                 contact_distance: CONTACT_DISTANCE,
-                ..CollideOptions::with_mode(mode)
+                ..CollideOptions::with_mode(mode.per(contacts_per))
             };
             let found = detect(&scene, &options);
             let mut with_edge = vec![0; worlds.len()];
@@ -146,9 +145,9 @@ pub fn edges_are_pushed_along_the_normal_of_the_floor(
             // In the others, points are known less well than this. Frank–Wolfe seldom comes so near
             // to the lowest point, and over a cell never.
             let least = match (mode, contacts_per) {
-                (Mode::Node | Mode::Exact, _) => worlds.len() / 2,
-                (Mode::Face, ContactsPer::Face | ContactsPer::Minimum) => worlds.len() / 8,
-                (Mode::Face, ContactsPer::Cell) => 0,
+                (Mode::Node | Mode::Exact(_), _) => worlds.len() / 2,
+                (Mode::Face { .. }, ContactsPer::Face | ContactsPer::Minimum) => worlds.len() / 8,
+                (Mode::Face { .. }, ContactsPer::Cell) => 0,
             };
             let seen = with_edge.iter().filter(|&&count| count > 0).count();
             println!("{mode:?} per {contacts_per:?}: {seen} of {} worlds, {with_edge:?}", worlds.len());
@@ -220,8 +219,10 @@ pub fn normals_are_in_the_cones_where_these_meet(
     }
     let (mut seen, mut none) = (0, 0);
     for contacts_per in [ContactsPer::Face, ContactsPer::Cell] {
-        let options =
-            CollideOptions { contacts_per, contact_distance: 2e-3, ..CollideOptions::with_mode(Mode::Exact) };
+        let options = CollideOptions {
+            contact_distance: 2e-3,
+            ..CollideOptions::with_mode(Mode::exact().per(contacts_per))
+        };
         let found = detect(&scene, &options).into_iter();
         for c in found.filter(|c| c.converged && c.distance.abs() <= 1e-6) {
             let [a, b] = [c.instance_a, c.instance_b].map(|id| worlds[id.0 as usize / 2][id.0 as usize % 2]);

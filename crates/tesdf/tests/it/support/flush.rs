@@ -136,9 +136,8 @@ impl Flush {
             }
         }
         let options = CollideOptions {
-            contacts_per: ContactsPer::Minimum,
             contact_distance: 1e-4,
-            ..CollideOptions::with_mode(Mode::Exact)
+            ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Minimum))
         };
         (scene, options)
     }

@@ -34,16 +34,17 @@ pub struct Kept {
 
 impl Detection<'_> {
     fn found(&self, scene: &Scene, contact_distance: f64) -> Contacts {
-        let contacts_per = ContactsPer::Face;
-        (self.detect)(scene, &CollideOptions { contacts_per, contact_distance, ..CollideOptions::default() })
+        (self.detect)(scene, &CollideOptions { contact_distance, ..CollideOptions::default() })
     }
 
     /// Checks that each face with a contact per cell has its least distance among the contacts per
     /// face: its own, or that of one of its vertices.
     pub fn keeps_least_distances(&self, bodies: &[Placed; 2], contact_distance: f64) -> Kept {
         let scene = scene(bodies);
-        let contacts_per = ContactsPer::Cell;
-        let by_cell = CollideOptions { contact_distance, contacts_per, ..CollideOptions::default() };
+        let by_cell = CollideOptions {
+            contact_distance,
+            ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Cell))
+        };
         let by_cell = detect(&scene, &by_cell).expect("a good scene");
         let by_face = self.found(&scene, contact_distance);
         let pairs =
@@ -95,8 +96,9 @@ impl Detection<'_> {
     ) -> [usize; 2] {
         let scene = scene(bodies);
         let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
-        let [all, minima] = [ContactsPer::Face, ContactsPer::Minimum]
-            .map(|contacts_per| (self.detect)(&scene, &CollideOptions { contacts_per, ..options }));
+        let [all, minima] = [ContactsPer::Face, ContactsPer::Minimum].map(|contacts_per| {
+            (self.detect)(&scene, &CollideOptions { mode: options.mode.per(contacts_per), ..options })
+        });
         let size = bodies[0].diagonal().max(bodies[1].diagonal());
         let mut counts = [minima.len(), 0];
         for [a, b] in [[0, 1], [1, 0]] {
@@ -166,8 +168,10 @@ impl Detection<'_> {
         let peg = block(end, end + DVec3::new(0.3, 0.2, 0.6), 1);
         let scene = scene(&[wall, peg]);
         for (contacts_per, is_there) in [(ContactsPer::Face, true), (ContactsPer::Minimum, false)] {
-            let options =
-                CollideOptions { contacts_per, contact_distance: 0.05, ..CollideOptions::default() };
+            let options = CollideOptions {
+                contact_distance: 0.05,
+                ..CollideOptions::with_mode(Mode::exact().per(contacts_per))
+            };
             let found = (self.detect)(&scene, &options);
             let oblique = of_direction(found.as_slice(), 0, 1).any(|c| c.normal.z.abs() > 0.3);
             assert_eq!(oblique, is_there, "{contacts_per:?}");
@@ -187,8 +191,10 @@ impl Detection<'_> {
         let links =
             [Pose::IDENTITY, next].map(|pose| Placed::new("chain_link", Placement { pose, scale: 1.0 }));
         let scene = scene(&links);
-        let contacts_per = ContactsPer::Minimum;
-        let options = CollideOptions { contacts_per, contact_distance: 2e-4, ..CollideOptions::default() };
+        let options = CollideOptions {
+            contact_distance: 2e-4,
+            ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Minimum))
+        };
         let found = (self.detect)(&scene, &options);
         for side in [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
             let holds = |(a, b, sign): (u32, u32, f64)| {
@@ -255,10 +261,8 @@ impl Detection<'_> {
     fn box_stands(&self, contacts_per: ContactsPer, (turn, shift): (f64, DVec3), near: f64) -> usize {
         let half = DVec3::splat(0.05);
         let options = CollideOptions {
-            contacts_per,
             contact_distance: 2e-4,
-            cos_theta: Some(0.5),
-            ..CollideOptions::default()
+            ..CollideOptions::with_mode(Mode::exact().per(contacts_per).filtered(0.5))
         };
         let mut unconverged = 0;
         for [n_lower, n_upper] in [[1, 1], [1, 8], [8, 1], [8, 8], [3, 5]] {
@@ -283,10 +287,8 @@ impl Detection<'_> {
 
     pub fn box_stands_on_a_plane_and_on_four_pegs(&self, contacts_per: ContactsPer) {
         let options = CollideOptions {
-            contacts_per,
             contact_distance: 2e-4,
-            cos_theta: Some(0.5),
-            ..CollideOptions::default()
+            ..CollideOptions::with_mode(Mode::exact().per(contacts_per).filtered(0.5))
         };
         let plate = block(DVec3::new(-0.05, -0.05, 0.0), DVec3::new(0.05, 0.05, 0.01), 1);
         let corners =
@@ -334,11 +336,10 @@ impl Detection<'_> {
             of_direction(found.as_slice(), 1, 0).map(|c| (c.face_a, c.distance)).collect::<Vec<_>>()
         };
         for &mode in modes {
-            let by_cell =
-                CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(mode) };
+            let by_cell = CollideOptions::with_mode(mode.per(ContactsPer::Cell));
             let all = own(&detect(&scene, &by_cell).expect("a good scene"));
             assert!(all.len() >= 3, "{all:?}");
-            let by_face = CollideOptions { contacts_per: ContactsPer::Face, ..by_cell };
+            let by_face = CollideOptions { mode: by_cell.mode.per(ContactsPer::Face), ..by_cell };
             let one = own(&(self.detect)(&scene, &by_face));
             assert_eq!(one.len(), 1, "{one:?}");
             let lowest = all.iter().map(|c| c.0).min().expect("a face");

@@ -102,12 +102,8 @@ pub fn assert_contacts(a: &Body, b: &Body, poses: [Pose; 2]) {
         of.on_faces(1500).into_iter().map(distance).fold(f64::INFINITY, f64::min)
     };
     let sampled = [least(a, b, &poses[0], &poses[1]), least(b, a, &poses[1], &poses[0])];
-    for mode in [Mode::Exact, Mode::Face, Mode::Node] {
-        let options = CollideOptions {
-            contact_distance: 0.5 * size,
-            cos_theta: None,
-            ..CollideOptions::with_mode(mode)
-        };
+    for mode in [Mode::exact(), Mode::face(), Mode::Node] {
+        let options = CollideOptions { contact_distance: 0.5 * size, ..CollideOptions::with_mode(mode) };
         let found = detect(&scene, &options).expect("contacts");
         for contact in found.iter() {
             let [of, field, pose] = if contact.instance_a == ids[0] { [0, 1, 1] } else { [1, 0, 0] };
@@ -124,7 +120,7 @@ pub fn assert_contacts(a: &Body, b: &Body, poses: [Pose; 2]) {
             );
         }
         let deepest = found.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
-        if mode == Mode::Exact {
+        if mode == Mode::exact() {
             let sampled = sampled[0].min(sampled[1]);
             assert!(deepest <= sampled + tolerance, "{deepest} {sampled}");
         }
@@ -179,8 +175,10 @@ pub fn assert_faces(
     let shapes = [of, field].map(|body| scene.add_shape(body.asset.clone()).expect("a shape"));
     let a = scene.add(Instance::new(shapes[0], *from)).expect("an instance");
     scene.add(Instance::new(shapes[1], *to)).expect("an instance");
-    let options =
-        CollideOptions { contact_distance, contacts_per: ContactsPer::Cell, ..CollideOptions::default() };
+    let options = CollideOptions {
+        contact_distance,
+        ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Cell))
+    };
     let found = detect(&scene, &options).expect("contacts");
     let size = of.mesh.diagonal().max(field.mesh.diagonal());
     let tolerance = 1e-5 * size;
