@@ -109,11 +109,7 @@ impl Loaded {
         inside: Inside,
         repair: RepairMode,
     ) -> Result<(SolidMesh, Option<PathBuf>, Source), Error> {
-        let found = match repair {
-            RepairMode::Never => SolidMesh::with_inside(self.mesh, inside).map(|solid| (solid, None)),
-            RepairMode::Auto => SolidMesh::repaired(self.mesh, inside),
-        };
-        match found {
+        match SolidMesh::with_repair(self.mesh, inside, repair) {
             Ok((solid, changes)) => Ok((solid, self.path, self.source.repaired(changes.as_ref()))),
             Err(e) => Err(Error::NotSolid(self.path, e)),
         }

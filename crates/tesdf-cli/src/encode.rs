@@ -9,7 +9,7 @@ use tesdf::asset::about::{Repair, Source, Statistics};
 use tesdf::base::unit;
 use tesdf::domain::tetrahedra_files;
 use tesdf::encode::{DomainChoice, EncodeOptions, Encoder, Method};
-use tesdf::mesh::{Defect, LoadReport, LoadedMesh, RepairReport, Severity};
+use tesdf::mesh::{Defect, LoadReport, LoadedSolid, RepairReport, Severity, SolidMesh, SolidOptions};
 use tesdf::{Certificate, Progress, TeSdf};
 
 use crate::terminal::device::{self, Choice};
@@ -26,7 +26,7 @@ mod split;
 use crate::encode_all::Batch;
 use crate::encode_all::meshes::Mesh;
 pub use choices::{ChoiceArgs, RepairChoice};
-use choices::{encode, solid};
+use choices::encode;
 
 const ENCODED_HELP: &str = "Mesh file: STL, OBJ, PLY, OFF, glTF, GLB, 3MF, or STEP, IGES, BREP by the program Gmsh; or a \
                             robot description, URDF or MJCF, whose collision meshes are all encoded";
@@ -127,12 +127,15 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
     let output = output::open(&args.output, &args.inputs(), args.consent)?;
     let start = Instant::now();
-    let LoadedMesh { mesh, report: load, .. } = args.cad.read(&args.mesh)?;
-    let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
+    args.cad.check(&args.mesh)?;
     let choices = args.choices.choices();
-    let options = choices.options().map_err(Failure::new)?.or_unit(load.unit.as_deref());
-    let (solid, repaired) =
-        pool.install(|| solid(mesh, options.inside, args.choices.repair)).map_err(|e| at(&e))?;
+    let options = choices.options().map_err(Failure::new)?;
+    let how =
+        SolidOptions { inside: options.inside, repair: args.choices.repair_mode(), cad: args.cad.options() };
+    let loaded = pool.install(|| SolidMesh::load(&args.mesh, &how)).map_err(Failure::new)?;
+    let source = loaded.source();
+    let LoadedSolid { solid, report: load, repaired, .. } = loaded;
+    let options = options.or_unit(load.unit.as_deref());
     load.notes.iter().for_each(|note| report::warning(note));
     let conflict = unit::conflict(load.unit.as_deref(), args.choices.unit.as_deref());
     conflict.iter().for_each(|found| report::warning(found));
@@ -141,7 +144,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     warn(solid.warnings());
 
-    let source = Source::of_file(&args.mesh, load.source_blake3.clone()).repaired(repaired.as_ref());
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
     if options.method == Method::Certified && args.device != Choice::Processor {

@@ -7,7 +7,7 @@ use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 pub use tesdf::encode::Preset;
 use tesdf::encode::{EncodeOptions, Encoder};
-use tesdf::mesh::{RepairOptions, SolidMesh, repair};
+use tesdf::mesh::{RepairMode, SolidMesh, SolidOptions};
 
 /// A mesh that the encoder accepts.
 pub struct Input {
@@ -19,34 +19,17 @@ pub struct Input {
 }
 
 impl Input {
-    /// Reads a mesh file. A mesh that cannot be encoded is repaired with default options, and
-    /// stderr reports the changes.
+    /// Reads a mesh file. A mesh that cannot be encoded is repaired, and stderr reports the changes.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", path.display()));
-        let loaded = tesdf::mesh::read(path).map_err(|e| e.in_file(path))?;
+        let options = SolidOptions { repair: RepairMode::Auto, ..SolidOptions::default() };
+        let loaded = SolidMesh::load(path, &options)?;
         let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let source = Source::of_file(path, loaded.report.source_blake3);
-        let solid = match SolidMesh::new(loaded.mesh.clone()) {
-            Ok(solid) => solid,
-            Err(e) if e.is_repairable() => {
-                let repaired = repair(&loaded.mesh, &RepairOptions::default()).map_err(|e| at(&e))?;
-                let r = &repaired.report;
-                eprintln!(
-                    "note: {}: repaired with default options: {} faces with two equal corners and {} duplicates dropped, \
-                     {} edges split, {} faces vanished, {} reversed",
-                    path.display(),
-                    r.collapsed_faces.len(),
-                    r.duplicate_faces.len(),
-                    r.split_edges.len(),
-                    r.vanished_faces.len(),
-                    r.reversed_faces.len()
-                );
-                name += " (repaired)";
-                SolidMesh::new(repaired.mesh).map_err(|e| at(&e))?
-            }
-            Err(e) => return Err(at(&e)),
-        };
-        Ok(Self { name, solid, source })
+        let source = loaded.source();
+        if let Some(repair) = &source.repair {
+            eprintln!("note: {}: repaired {repair}", path.display());
+            name += " (repaired)";
+        }
+        Ok(Self { name, solid: loaded.solid, source })
     }
 
     /// Encodes the mesh on all threads of the current rayon pool. Returns the asset and the time,

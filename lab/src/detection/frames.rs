@@ -17,7 +17,7 @@ use tesdf_sim::scene_file::{LoadedScene, MAX_BODIES};
 use super::poses::{PoseFile, VERSION};
 use tesdf_cli::terminal::progress::{interrupt_flag, watched};
 use tesdf_cli::terminal::report::Failure;
-use tesdf_cli::terminal::{asset_file, mesh_file, run_file};
+use tesdf_cli::terminal::{asset_file, run_file};
 
 /// Maximum number of instances in all worlds.
 const MAX_INSTANCES: usize = 1 << 20;
@@ -226,7 +226,7 @@ pub fn geometry(
         return asset_file::open(path).map(Arc::new);
     }
     let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
-    let solid = SolidMesh::new(mesh_file::read(path)?.mesh).map_err(|e| named(&e))?;
+    let solid = SolidMesh::read(path).map_err(Failure::new)?;
     let progress = Progress::default();
     watched(&progress, interrupted, || {
         Encoder::new().options(options.clone()).progress(&progress).encode(&solid)

@@ -6,11 +6,10 @@ use tesdf::asset::about::Source;
 use tesdf::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
 use tesdf::domain::{ConformingMesh, read_tetrahedra};
 use tesdf::encode::Domain;
-use tesdf::mesh::SolidMesh;
+use tesdf::mesh::{SolidMesh, SolidOptions};
 
 use super::DomainName;
 use super::meshes::Mesh;
-use tesdf_cli::terminal::mesh_file;
 use tesdf_cli::terminal::report::{Failure, note};
 
 /// A solid in a domain.
@@ -48,9 +47,8 @@ pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Subject, Fai
         let source = Source::of_file(&path, String::new());
         return Ok(Subject { solid, source, name: "file".into(), conforming: Some(conforming) });
     }
-    let loaded = mesh_file::read(&path)?;
-    let source = Source::of_file(&path, loaded.report.source_blake3);
-    let solid = SolidMesh::new(loaded.mesh).map_err(|e| at(&e))?;
+    let loaded = SolidMesh::load(&path, &SolidOptions::default()).map_err(Failure::new)?;
+    let (source, solid) = (loaded.source(), loaded.solid);
     if domain == DomainName::Bisection {
         return Ok(Subject { solid, source, name: "bisection".into(), conforming: None });
     }

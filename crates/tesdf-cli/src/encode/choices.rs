@@ -5,13 +5,13 @@ use std::path::Path;
 use crate::terminal::parse;
 use crate::terminal::report::Failure;
 use clap::ValueEnum;
-use tesdf::base::{Inside, SurfaceFaces};
+use tesdf::base::SurfaceFaces;
 use tesdf::encode::{
     Deformation, Domain, DomainChoice, EncodeChoices, Encoder, EncoderChoice, InsideChoice, Preset,
     Refinement, Threshold,
 };
 use tesdf::geometry::Aabb;
-use tesdf::mesh::{AutoRepaired, NotSolid, SolidMesh, TriangleMesh};
+use tesdf::mesh::{RepairMode, SolidMesh};
 use tesdf::{Progress, TeSdf};
 
 /// The options of the encoder.
@@ -82,6 +82,11 @@ pub enum RepairChoice {
 }
 
 impl ChoiceArgs {
+    /// Whether meshes are repaired before they are encoded.
+    pub fn repair_mode(&self) -> RepairMode {
+        self.repair.map_or(RepairMode::Never, |RepairChoice::Auto| RepairMode::Auto)
+    }
+
     /// The options for the library.
     pub fn choices(&self) -> EncodeChoices {
         let numbers = |r: &Aabb| [r.min.x, r.min.y, r.min.z, r.max.x, r.max.y, r.max.z];
@@ -112,21 +117,6 @@ pub fn threshold(text: &str) -> Result<Threshold, String> {
     match text {
         "safe" => Ok(Threshold::CoveringRadius),
         _ => parse::length(text).map(Threshold::Absolute),
-    }
-}
-
-/// The solid of a mesh, and the changes if it was repaired.
-///
-/// # Errors
-/// The mesh has no well-defined inside, and no repair was asked for or none works.
-pub(crate) fn solid(
-    mesh: TriangleMesh,
-    inside: Inside,
-    repair: Option<RepairChoice>,
-) -> Result<(SolidMesh, Option<AutoRepaired>), NotSolid> {
-    match repair {
-        None => Ok((SolidMesh::with_inside(mesh, inside)?, None)),
-        Some(RepairChoice::Auto) => SolidMesh::repaired(mesh, inside),
     }
 }
 

@@ -9,12 +9,12 @@ use tesdf::asset::FORMAT_VERSION;
 use tesdf::asset::about::{Repair, Source};
 use tesdf::encode::{DomainChoice, EncodeChoices, EncodeOptions, Encoder};
 use tesdf::glam::DAffine3;
-use tesdf::mesh::{LoadReport, LoadedMesh, MeshError, MeshFormat, TriangleMesh};
+use tesdf::mesh::{LoadReport, LoadedMesh, MeshError, MeshFormat, RepairMode, SolidMesh, TriangleMesh};
 use tesdf::save::save_atomic;
 use tesdf::{Certificate, Progress, TeSdf};
 
 use super::meshes::{Content, Mesh, Placed};
-use crate::encode::choices::{ChoiceArgs, RepairChoice, encode, solid};
+use crate::encode::choices::{ChoiceArgs, encode};
 use crate::terminal::asset_file;
 use crate::terminal::mesh_file::{self, CadArgs};
 use crate::terminal::report::Failure;
@@ -23,7 +23,7 @@ use crate::terminal::report::Failure;
 #[derive(Debug)]
 pub struct Job {
     choices: EncodeChoices,
-    repair: Option<RepairChoice>,
+    repair: RepairMode,
     options: EncodeOptions,
     cad: CadArgs,
     output: PathBuf,
@@ -79,7 +79,7 @@ impl Job {
     pub fn new(args: &ChoiceArgs, cad: CadArgs, output: &Path) -> Result<Self, Failure> {
         let choices = args.choices();
         let options = choices.options().map_err(Failure::new)?;
-        Ok(Self { choices, repair: args.repair, options, cad, output: output.to_path_buf() })
+        Ok(Self { choices, repair: args.repair_mode(), options, cad, output: output.to_path_buf() })
     }
 
     /// The options of the encoder.
@@ -144,7 +144,7 @@ impl Job {
             let found = format!("{} changed while it was read; encode it again", path.display());
             return Err(Failure::new(found));
         }
-        let (solid, repaired) = solid(surface, self.options.inside, self.repair)
+        let (solid, repaired) = SolidMesh::with_repair(surface, self.options.inside, self.repair)
             .map_err(|e| Failure::new(format!("{}: {e}", mesh.name_in(path))))?;
         let source = expected.source.clone().repaired(repaired.as_ref());
         let options = self.options.clone().or_unit(load.unit.as_deref());
@@ -179,7 +179,7 @@ impl Job {
             parts.push(&cad);
         }
         // Without a repair, the name is what it was before there was one.
-        parts.extend(self.repair.map(|RepairChoice::Auto| "repair auto"));
+        parts.extend((self.repair == RepairMode::Auto).then_some("repair auto"));
         for part in parts {
             // The length keeps two parts apart.
             hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());

@@ -43,15 +43,22 @@ impl CadArgs {
     /// Reads a mesh. The error message names the file.
     ///
     /// # Errors
-    /// The same errors as [`tesdf::mesh::read_with`], and options that do not apply to the file.
+    /// The same errors as [`tesdf::mesh::read_with`], and those of [`check`](Self::check).
     pub fn read(&self, path: &Path) -> Result<LoadedMesh, Failure> {
+        self.check(path)?;
+        tesdf::mesh::read_with(path, &self.options()).map_err(|e| Failure::new(e.in_file(path)))
+    }
+
+    /// # Errors
+    /// Options are given, and do not apply to the file.
+    pub fn check(&self, path: &Path) -> Result<(), Failure> {
         if self.is_given() && MeshFormat::of_path(path).is_ok_and(|format| !format.is_cad()) {
             return Err(Failure::new(format!(
                 "--mesh-size and --deviation are of STEP, IGES and BREP files, and {} is a mesh; leave them out",
                 path.display()
             )));
         }
-        tesdf::mesh::read_with(path, &self.options()).map_err(|e| Failure::new(e.in_file(path)))
+        Ok(())
     }
 }
 

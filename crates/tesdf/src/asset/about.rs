@@ -11,7 +11,7 @@ use super::AssetError;
 use super::options::EncodeOptions;
 use crate::base::{Certificate, Inside, InsideRule, SurfaceFaces, Written};
 #[cfg(feature = "encode")]
-use crate::mesh::AutoRepaired;
+use crate::mesh::{AutoRepaired, LoadedSolid};
 
 /// The file that a mesh came from.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,6 +83,14 @@ impl From<&AutoRepaired> for Repair {
             filled_holes: report.filled_holes.len(),
             filled_area: report.filled_holes.iter().map(|hole| hole.area).sum(),
         }
+    }
+}
+
+#[cfg(feature = "encode")]
+impl LoadedSolid {
+    /// The file of the solid, and what a repair changed.
+    pub fn source(&self) -> Source {
+        Source::of_file(&self.path, self.report.source_blake3.clone()).repaired(self.repaired.as_ref())
     }
 }
 

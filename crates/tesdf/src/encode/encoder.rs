@@ -6,7 +6,7 @@ use super::sampled::Processor;
 use super::{Domain, EncodeError, EncodeOptions, Preset, Sampler, Source};
 use crate::asset::TeSdf;
 use crate::base::{Inside, Length, Progress};
-use crate::mesh::{LoadReport, LoadedMesh, ReadSolidError, RepairMode, SolidMesh, read};
+use crate::mesh::{ReadSolidError, RepairMode, SolidMesh, SolidOptions};
 
 /// Encodes solids.
 ///
@@ -126,7 +126,7 @@ impl<'a> Encoder<'a> {
     }
 
     /// Sets whether [`encode_file`](Self::encode_file) repairs a mesh without a well-defined inside
-    /// ([`SolidMesh::repaired`]). The asset records what was changed
+    /// ([`SolidMesh::with_repair`]). The asset records what was changed
     /// ([`Source::repair`](crate::asset::about::Source::repair)). The default is
     /// [`RepairMode::Never`].
     pub fn repair(self, repair: RepairMode) -> Self {
@@ -202,16 +202,10 @@ impl<'a> Encoder<'a> {
 
     fn encode_path(&self, path: &Path) -> Result<TeSdf, EncodeFileError> {
         let inside = self.resolved().inside;
-        let (solid, source, report) = match self.repair {
-            RepairMode::Never => {
-                let (solid, report) = SolidMesh::load(path, inside)?;
-                (solid, Source::of_file(path, report.source_blake3.clone()), report)
-            }
-            RepairMode::Auto => load_repaired(path, inside)?,
-        };
-        let unit = report.unit.as_deref();
-        let at = |source| EncodeFileError::Encode { path: path.to_owned(), source };
-        self.encode_from(&solid, &source, unit).map_err(at)
+        let options = SolidOptions { inside, repair: self.repair, ..SolidOptions::default() };
+        let loaded = SolidMesh::load(path, &options)?;
+        self.encode_from(&loaded.solid, &loaded.source(), loaded.report.unit.as_deref())
+            .map_err(|source| EncodeFileError::Encode { path: loaded.path, source })
     }
 
     fn encode_from(
@@ -238,16 +232,6 @@ impl<'a> Encoder<'a> {
         options.inside = self.inside.unwrap_or(options.inside);
         options
     }
-}
-
-/// Reads and repairs a mesh. The source says what was changed.
-fn load_repaired(path: &Path, inside: Inside) -> Result<(SolidMesh, Source, LoadReport), ReadSolidError> {
-    let LoadedMesh { mesh, report, .. } =
-        read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
-    let (solid, found) = SolidMesh::repaired(mesh, inside)
-        .map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
-    let source = Source::of_file(path, report.source_blake3.clone()).repaired(found.as_ref());
-    Ok((solid, source, report))
 }
 
 impl TeSdf {

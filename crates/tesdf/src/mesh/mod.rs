@@ -31,7 +31,7 @@ pub use repair::{
     RepairReport, Repaired, ShellOrientation, SplitEdge, UnknownRepair, closing_tolerance, repair,
     repair_auto,
 };
-pub use solid::{NotSolid, ReadSolidError, SolidMesh};
+pub use solid::{LoadedSolid, NotSolid, ReadSolidError, SolidMesh, SolidOptions};
 pub use split::{NamedMesh, split};
 pub use topology::{Edge, EdgeUse, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};

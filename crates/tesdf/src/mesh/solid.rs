@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::count::count;
 use super::{
-    AutoRepaired, CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, MeshError, ReadError,
-    RepairOptions, Severity, Survey, TriangleMesh, check_and_survey,
+    AutoRepaired, CadOptions, CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, MeshError, ReadError,
+    RepairMode, RepairOptions, Severity, Survey, TriangleMesh, check_and_survey,
     hairs::{COUNTS, LEFT_OUT, hairs, tell_of_hairs},
     other_rules,
     presented::{Presentation, Presented},
-    read, repair_auto,
+    read_with, repair_auto,
 };
 use crate::base::{Inside, InsideRule};
 
@@ -38,8 +38,7 @@ pub struct SolidMesh {
 }
 
 impl SolidMesh {
-    /// Reads the mesh file at `path` and checks the mesh: [`read`](super::read()), then
-    /// [`new`](Self::new). Call these two directly to see the changes made while reading.
+    /// Reads the mesh file at `path` and checks the mesh: [`load`](Self::load) with the defaults.
     ///
     /// # Errors
     /// [`ReadSolidError`] names the file. It says why the file cannot be read, or why its mesh has
@@ -60,16 +59,24 @@ impl SolidMesh {
     /// # }
     /// ```
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadSolidError> {
-        Self::load(path.as_ref(), Inside::default()).map(|(solid, _)| solid)
+        Ok(Self::load(path, &SolidOptions::default())?.solid)
     }
 
-    /// As [`read`](Self::read) with a rule, and returns the report of reading.
-    pub(crate) fn load(path: &Path, inside: Inside) -> Result<(Self, LoadReport), ReadSolidError> {
-        let LoadedMesh { mesh, report, .. } =
-            read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
-        let solid = Self::with_inside(mesh, inside)
-            .map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
-        Ok((solid, report))
+    /// Reads the mesh file at `path`, [`read_with`](super::read_with()), and makes a solid of the
+    /// mesh, [`with_repair`](Self::with_repair). Returns the changes made on the way, too.
+    ///
+    /// # Errors
+    /// The same as for [`read`](Self::read).
+    pub fn load(path: impl AsRef<Path>, options: &SolidOptions) -> Result<LoadedSolid, ReadSolidError> {
+        let path = path.as_ref().to_owned();
+        let LoadedMesh { mesh, report, .. } = match read_with(&path, &options.cad) {
+            Ok(loaded) => loaded,
+            Err(source) => return Err(ReadSolidError::Read { path, source }),
+        };
+        match Self::with_repair(mesh, options.inside, options.repair) {
+            Ok((solid, repaired)) => Ok(LoadedSolid { path, solid, report, repaired }),
+            Err(source) => Err(ReadSolidError::NotSolid { path, source }),
+        }
     }
 
     /// Checks the mesh with [`check`](super::check()).
@@ -156,9 +163,10 @@ impl SolidMesh {
         self.presentation.of(&self.mesh, self.simple)
     }
 
-    /// As [`with_inside`](Self::with_inside). A mesh that is refused, or has faces without area that
-    /// stand out of the surface, is repaired first, by [`repair_auto`](super::repair_auto()). Returns
-    /// what was changed as well, or `None` when the mesh is a solid as it is.
+    /// As [`with_inside`](Self::with_inside). With [`RepairMode::Auto`], a mesh that is refused, or
+    /// has faces without area that stand out of the surface, is repaired first, by
+    /// [`repair_auto`](super::repair_auto()). Returns what was changed as well, or `None` when the
+    /// mesh is a solid as it is.
     ///
     /// # Errors
     /// [`NotSolid`] when no repair makes the mesh a solid.
@@ -168,19 +176,27 @@ impl SolidMesh {
     /// ```
     /// use tesdf::base::Inside;
     /// use tesdf::glam::DVec3;
+    /// use tesdf::mesh::RepairMode;
     /// use tesdf::{SolidMesh, TriangleMesh};
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// // A tetrahedron without one of its faces.
     /// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     /// let open = TriangleMesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3]])?;
-    /// let (solid, changes) = SolidMesh::repaired(open, Inside::default())?;
+    /// let (solid, changes) = SolidMesh::with_repair(open, Inside::default(), RepairMode::Auto)?;
     /// assert_eq!(solid.mesh().faces().len(), 4);
     /// assert_eq!(changes.unwrap().repaired.report.filled_holes.len(), 1);
     /// # Ok(())
     /// # }
     /// ```
-    pub fn repaired(mesh: TriangleMesh, inside: Inside) -> Result<(Self, Option<AutoRepaired>), NotSolid> {
+    pub fn with_repair(
+        mesh: TriangleMesh,
+        inside: Inside,
+        repair: RepairMode,
+    ) -> Result<(Self, Option<AutoRepaired>), NotSolid> {
+        if repair == RepairMode::Never {
+            return Ok((Self::with_inside(mesh, inside)?, None));
+        }
         let (report, survey) = check_and_survey(&mesh, inside.rule);
         let is_clean = !inside.rule.needs_closed() || hairs(mesh.vertices(), mesh.faces()).is_empty();
         if report.encodable && is_clean {
@@ -218,6 +234,30 @@ impl SolidMesh {
     pub fn into_mesh(self) -> TriangleMesh {
         self.mesh
     }
+}
+
+/// How [`SolidMesh::load`] makes a solid of a mesh file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SolidOptions {
+    /// What is inside, and which faces are the surface.
+    pub inside: Inside,
+    /// Whether the mesh is repaired.
+    pub repair: RepairMode,
+    /// How finely the surfaces of a CAD file become triangles.
+    pub cad: CadOptions,
+}
+
+/// The solid of a mesh file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedSolid {
+    /// The file.
+    pub path: PathBuf,
+    /// The solid.
+    pub solid: SolidMesh,
+    /// What the file has, and the changes made while reading.
+    pub report: LoadReport,
+    /// What a repair changed. `None` when the mesh is a solid as it is.
+    pub repaired: Option<AutoRepaired>,
 }
 
 /// Why a mesh file does not give a [`SolidMesh`]. The message names the file.
@@ -266,11 +306,6 @@ impl NotSolid {
     /// The full report of the check.
     pub fn report(&self) -> &CheckReport {
         &self.report
-    }
-
-    /// Whether [`repair`](super::repair()) with default options makes the mesh a solid.
-    pub fn is_repairable(&self) -> bool {
-        self.suggestion == Some(RepairOptions::DEFAULT)
     }
 
     /// The options with which [`repair`](super::repair()) makes the mesh a solid, found by trying:

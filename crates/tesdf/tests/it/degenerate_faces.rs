@@ -16,7 +16,7 @@ use tesdf::collide::{
 };
 use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{Defect, Severity, SolidMesh, TriangleMesh, check, repair_auto};
+use tesdf::mesh::{Defect, RepairMode, Severity, SolidMesh, TriangleMesh, check, repair_auto};
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, verify};
 
@@ -335,7 +335,8 @@ fn faces_without_area_that_stand_out_are_left_out_where_they_are_no_surface() {
             assert!((distance(&solid) - 2.0).abs() < 1e-6, "{k} {rule:?}: {}", distance(&solid));
             tells(solid.warnings(), left_out);
         }
-        let (solid, changes) = SolidMesh::repaired(mesh.clone(), Inside::default()).expect("a solid");
+        let (solid, changes) =
+            SolidMesh::with_repair(mesh.clone(), Inside::default(), RepairMode::Auto).expect("a solid");
         assert!((distance(&solid) - 2.0).abs() < 1e-6, "{k}: {}", distance(&solid));
         assert!(solid.is_simple() && solid.mesh().faces().len() == 12, "{k}: {:?}", solid.warnings());
         let changes = changes.expect("changes");
@@ -348,5 +349,5 @@ fn faces_without_area_that_stand_out_are_left_out_where_they_are_no_surface() {
     let solid = SolidMesh::new(mesh.clone()).expect("a solid");
     assert!((distance(&solid) - 2.0).abs() < 1e-6);
     assert!(solid.warnings().iter().all(|d| !d.message.contains("stands out")), "{:?}", solid.warnings());
-    assert!(SolidMesh::repaired(mesh, Inside::default()).expect("a solid").1.is_none());
+    assert!(SolidMesh::with_repair(mesh, Inside::default(), RepairMode::Auto).expect("a solid").1.is_none());
 }

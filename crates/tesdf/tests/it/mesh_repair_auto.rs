@@ -54,13 +54,15 @@ fn a_refusal_names_the_options_that_work() {
     let refusal = SolidMesh::new(load("open_half.obj")).unwrap_err();
     let options = RepairOptions { fill_holes: Some(u32::MAX), ..RepairOptions::DEFAULT };
     assert_eq!(refusal.suggestion(), Some(&options));
-    assert!(!refusal.is_repairable());
     let text = refusal.to_string();
     assert!(text.contains("`tesdf repair MESH -o FILE.ply --fill-holes` makes it encodable"), "{text}");
-    let (solid, changes) = SolidMesh::repaired(load("open_half.obj"), Inside::default()).unwrap();
+    let (solid, changes) =
+        SolidMesh::with_repair(load("open_half.obj"), Inside::default(), RepairMode::Auto).unwrap();
     assert_eq!(changes.unwrap().options, Some(options));
     assert!(solid.is_simple());
-    assert!(SolidMesh::repaired(load("cavity.obj"), Inside::default()).unwrap().1.is_none());
+    assert!(
+        SolidMesh::with_repair(load("cavity.obj"), Inside::default(), RepairMode::Auto).unwrap().1.is_none()
+    );
 }
 
 /// A sheet is no solid with a hole, bent or flat.
@@ -79,7 +81,7 @@ fn sheets_are_not_filled() {
         let vertices = (0..n * n).map(|v| bent(v, height)).collect();
         let sheet = TriangleMesh::new(vertices, (0..(n - 1) * (n - 1)).flat_map(square).collect()).unwrap();
         assert_eq!(flags(&sheet), None, "height {height}");
-        let refusal = SolidMesh::repaired(sheet, Inside::default()).unwrap_err();
+        let refusal = SolidMesh::with_repair(sheet, Inside::default(), RepairMode::Auto).unwrap_err();
         assert!(refusal.suggestion().is_none() && refusal.to_string().contains("cannot make it encodable"));
     }
 }
@@ -175,5 +177,8 @@ fn a_soup_of_triangles_ends() {
     }
     let faces = (0..100_000).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
     let soup = TriangleMesh::new(vertices, faces).unwrap();
-    assert!(SolidMesh::repaired(soup, Inside::default()).is_err(), "sheets are no solid");
+    assert!(
+        SolidMesh::with_repair(soup, Inside::default(), RepairMode::Auto).is_err(),
+        "sheets are no solid"
+    );
 }

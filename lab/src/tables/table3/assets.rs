@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tesdf::encode::Encoder;
 use tesdf::mesh::SolidMesh;
-use tesdf_cli::terminal::mesh_file;
 use tesdf_cli::terminal::report::Failure;
 use tesdf_parts::{LobedHole, Nut, Resolution, Size};
 
@@ -34,10 +33,7 @@ impl Assets {
     /// The mesh cannot be read or is not a solid, or the asset cannot be written.
     pub fn of_file(&self, mesh: &Path) -> Result<PathBuf, Failure> {
         let name = mesh.file_stem().unwrap_or_default().to_string_lossy();
-        self.asset(&name, || {
-            let loaded = mesh_file::read(mesh)?;
-            SolidMesh::new(loaded.mesh).map_err(|e| Failure::new(format!("{}: {e}", mesh.display())))
-        })
+        self.asset(&name, || SolidMesh::read(mesh).map_err(Failure::new))
     }
 
     /// The asset of the body that gives a scenario its tolerance, made for this one, µm.
