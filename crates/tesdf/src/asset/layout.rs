@@ -30,9 +30,9 @@ pub const NODES: SectionSpec = SectionSpec::required("domain.nodes", Element::U3
 pub const LISTS: SectionSpec = SectionSpec::required("lists.bytes", Element::U8, 1);
 /// `[P + 1]` where each palette begins among the palette faces.
 pub const PALETTE_STARTS: SectionSpec = SectionSpec::required("lists.palette_starts", Element::U32, 1);
-/// Low 16 bits of the palette faces (positions in [`FACES`]).
+/// Low bits of the palette faces (positions in [`FACES`]); see [`palette_face`].
 pub const PALETTES: SectionSpec = SectionSpec::required("lists.palettes", Element::U16, 1);
-/// Bits 16–23 of the palette faces. Only for meshes of more than 65,536 faces.
+/// High bits of the palette faces. Only for meshes of more than [`SHORT_FACES`] faces.
 pub const PALETTES_HIGH: SectionSpec = SectionSpec::optional("lists.palettes_high", Element::U8, 1);
 /// `[M, 12]` boxes of the two children of each node of the face tree: min x y z, max x y z, twice.
 /// They are relative to the middle of the cube, in the local frame.
@@ -59,8 +59,12 @@ pub const SECTIONS: [SectionSpec; 15] = [
     TREE_CHILDREN,
 ];
 
-/// Largest number of faces of an asset: palette faces have 24 bits.
-pub const MAX_FACES: usize = 1 << 24;
+/// Bits of a palette face in [`PALETTES`]. The others are in [`PALETTES_HIGH`].
+const LOW_BITS: u32 = u16::BITS;
+/// Largest number of faces of an asset without [`PALETTES_HIGH`].
+pub const SHORT_FACES: usize = 1 << LOW_BITS;
+/// Largest number of faces of an asset.
+pub const MAX_FACES: usize = 1 << (LOW_BITS + u8::BITS);
 /// Largest number of faces in a leaf of the face tree.
 pub const TREE_LEAF: usize = 8;
 /// Bits of a leaf's word for the number of faces, minus one.
@@ -122,7 +126,7 @@ pub const MAX_LIST_OFFSET: u32 = 1 << CODE;
 /// From this winding number on, the number is written before the list.
 pub const LONG_WINDING: u32 = 3;
 /// Bytes of this number.
-pub const WINDING_BYTES: u32 = 4;
+pub const WINDING_BYTES: u32 = size_of::<u32>() as u32;
 /// Code of a crossing cell with such a number.
 pub const LONG_CROSSING: u32 = CROSSING + LONG_WINDING;
 
@@ -146,7 +150,7 @@ impl Node {
             code @ CROSSING..LONG_CROSSING => Self::Listed(Label::Crossing(code - CROSSING), offset),
             LONG_CROSSING => {
                 let at = offset.checked_sub(WINDING_BYTES);
-                let bytes = at.and_then(|at| lists.get(at as usize..)?.first_chunk::<4>());
+                let bytes = at.and_then(|at| lists.get(at as usize..)?.first_chunk());
                 Self::Listed(Label::Crossing(bytes.map_or(0, |b| u32::from_le_bytes(*b))), offset)
             }
             FAR if offset == 1 => Self::Far(Side::Inside),
@@ -173,18 +177,29 @@ impl Node {
     }
 }
 
+/// Reads a palette face from its low and high bits.
+#[inline]
+pub fn palette_face(low: u16, high: u8) -> u32 {
+    u32::from(low) | u32::from(high) << LOW_BITS
+}
+
+/// The low and the high bits of a palette face.
+pub fn palette_bits(face: u32) -> (u16, u8) {
+    (face as u16, (face >> LOW_BITS) as u8)
+}
+
 /// The palette number that stands for "no palette". The list then has a u32 count and u32 faces.
 pub const NO_PALETTE: u16 = u16::MAX;
 /// Largest number of faces in a palette, so that one byte names each face.
 pub const PALETTE_SIZE: usize = 256;
 /// Bytes of a list before its count: the number of the palette.
-pub const PALETTE_BYTES: u32 = 2;
+pub const PALETTE_BYTES: u32 = size_of_val(&NO_PALETTE) as u32;
 /// Bytes of a list before its slots.
-pub const SLOTS: u32 = PALETTE_BYTES + 1;
+pub const SLOTS: u32 = PALETTE_BYTES + size_of::<u8>() as u32;
 /// Bytes of a list without a palette before its faces.
-pub const LISTED_FACES: u32 = PALETTE_BYTES + 4;
+pub const LISTED_FACES: u32 = PALETTE_BYTES + size_of::<u32>() as u32;
 /// Bytes of a face in such a list.
-pub const FACE_BYTES: u32 = 4;
+pub const FACE_BYTES: u32 = size_of::<u32>() as u32;
 
 /// The list of a cell, little-endian and unaligned. It is `palette u16, count u8, count × u8` with
 /// slots of the palette, or `NO_PALETTE u16, count u32, count × u32` with faces.
@@ -201,11 +216,11 @@ impl<'a> List<'a> {
     #[inline]
     pub fn decode(bytes: &'a [u8], offset: u32) -> Option<Self> {
         let rest = bytes.get(offset as usize..)?;
-        let (&palette, rest) = rest.split_first_chunk::<2>()?;
+        let (&palette, rest) = rest.split_first_chunk()?;
         let palette = u16::from_le_bytes(palette);
         if palette == NO_PALETTE {
-            let (&count, rest) = rest.split_first_chunk::<4>()?;
-            let length = (u32::from_le_bytes(count) as usize).checked_mul(4)?;
+            let (&count, rest) = rest.split_first_chunk()?;
+            let length = (u32::from_le_bytes(count) as usize).checked_mul(FACE_BYTES as usize)?;
             return rest.get(..length).map(Self::Faces);
         }
         let (&count, rest) = rest.split_first()?;
@@ -222,7 +237,7 @@ impl<'a> List<'a> {
             }
             Self::Faces(faces) => {
                 bytes.extend(NO_PALETTE.to_le_bytes());
-                bytes.extend(((faces.len() / 4) as u32).to_le_bytes());
+                bytes.extend(((faces.len() / FACE_BYTES as usize) as u32).to_le_bytes());
                 bytes.extend(faces);
             }
         }
@@ -232,7 +247,7 @@ impl<'a> List<'a> {
     pub fn len(self) -> usize {
         match self {
             Self::Slots(_, slots) => slots.len(),
-            Self::Faces(bytes) => bytes.len() / 4,
+            Self::Faces(bytes) => bytes.len() / FACE_BYTES as usize,
         }
     }
 

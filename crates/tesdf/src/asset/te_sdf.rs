@@ -495,8 +495,8 @@ impl TeSdf {
             return wrong(layout::PALETTE_STARTS, format!("palette {p} has not 0 to {PALETTE_SIZE} faces"));
         }
         if let Some(i) = (0..self.palettes.len()).find(|&i| {
-            let high = self.palettes_high.as_ref().map_or(0, |high| u32::from(high[i]));
-            u32::from(self.palettes[i]) | high << 16 >= f
+            let high = self.palettes_high.as_ref().map_or(0, |high| high[i]);
+            layout::palette_face(self.palettes[i], high) >= f
         }) {
             return wrong(
                 layout::PALETTES,

@@ -6,7 +6,7 @@ use crate::asset::layout::Label;
 use crate::base::Side;
 use crate::domain::Cell;
 use crate::geometry::{Aabb, AabbTree, SignRule, triangle_meets_tetrahedron};
-use crate::mesh::WindingNumber;
+use crate::mesh::{Presented, SolidMesh, Telling, TriangleMesh, WindingNumber};
 
 /// What tells the sides of cells. All is in the local frame.
 pub enum CellSigns {
@@ -44,6 +44,25 @@ impl SignFaces {
 }
 
 impl CellSigns {
+    /// `local` has the presented faces in the local frame.
+    pub fn new(solid: &SolidMesh, presented: &Presented, local: &TriangleMesh) -> Self {
+        match presented.telling {
+            Telling::Winding => Self::Winding(WindingNumber::new(local)),
+            Telling::Sheet => Self::Unsigned,
+            Telling::Rule | Telling::RuleUnoriented => {
+                let position = |v: u32| local.vertices()[v as usize];
+                let faces = [local.faces(), &presented.sign_faces].concat();
+                let triangles = presented.sign_faces.iter().map(|f| f.map(position)).collect();
+                Self::Rule(SignRule::new(solid.inside().rule, &faces, position), SignFaces::new(triangles))
+            }
+        }
+    }
+
+    /// Whether the sign changes in holes of the mesh.
+    pub fn jumps(&self) -> bool {
+        matches!(self, Self::Rule(rule, _) if rule.jumps())
+    }
+
     /// Whether a point is inside, for choices that only cost depends on.
     pub fn is_inside(&self, p: DVec3) -> bool {
         match self {

@@ -31,10 +31,12 @@ mod rank;
 mod refine;
 mod roots;
 pub(crate) mod sampled;
+mod sections;
 mod settled;
 mod statistics;
 pub(crate) mod surface;
 mod tighten;
+mod validate;
 
 /// For the GPU crate and for tests only: it may change in any version.
 #[doc(hidden)]

@@ -22,9 +22,9 @@ pub struct Arrays<'a> {
     pub lists: &'a [u8],
     /// Start of each palette, then the end of the last palette.
     pub palette_starts: &'a [u32],
-    /// Low 16 bits of the palette faces.
+    /// Low bits of the palette faces; see [`palette_face`](crate::asset::layout::palette_face).
     pub palettes: &'a [u16],
-    /// Bits 16 to 23 of the palette faces; `None` with at most 65,536 faces.
+    /// High bits of the palette faces; `None` where all of them are 0.
     pub palettes_high: Option<&'a [u8]>,
     /// Boxes of the two children of each node of the face tree.
     pub tree_boxes: &'a [[f32; 12]],

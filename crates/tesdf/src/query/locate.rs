@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use crate::TeSdf;
-use crate::asset::layout::{Label, List, Node};
+use crate::asset::layout::{Label, List, Node, palette_face};
 use crate::base::Side;
 use crate::domain::{Barycentric, Cell};
 
@@ -165,7 +165,7 @@ impl TeSdf {
                     None => faces.fill(slots.len(), |i| low[slots[i] as usize].into()),
                     Some(high) => {
                         let high = &high[range];
-                        let face = |s: usize| u32::from(low[s]) | u32::from(high[s]) << 16;
+                        let face = |s: usize| palette_face(low[s], high[s]);
                         faces.fill(slots.len(), |i| face(slots[i] as usize));
                     }
                 }
