@@ -9,7 +9,8 @@ mod support;
 use glam::DVec3;
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
-use tesdf::geometry::{Triangle, polygon_to_triangle, signed_crossing};
+use tesdf::geometry::Triangle;
+use tesdf::geometry::internal::{polygon_to_triangle, signed_crossing};
 
 fn points(bytes: &mut Unstructured) -> Result<[DVec3; 6]> {
     Ok([

@@ -1,6 +1,7 @@
 //! Exact signed distances of a mesh, which assets and peers are compared with.
 use rayon::prelude::*;
-use tesdf::geometry::{Aabb, AabbTree, Triangle};
+use tesdf::geometry::internal::AabbTree;
+use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{TriangleMesh, WindingNumber};
 

@@ -93,7 +93,7 @@ pub mod inspect;
 #[cfg(feature = "encode")]
 pub mod mesh;
 mod parallel;
-#[cfg(feature = "gmsh")]
+#[cfg(feature = "encode")]
 mod program;
 pub mod query;
 #[cfg(feature = "encode")]

@@ -23,13 +23,39 @@ pub(crate) struct Gmsh {
     folder: tempfile::TempDir,
 }
 
+/// Why the program Gmsh cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProgramError {
+    /// It does not exist, or does not start.
+    #[error("cannot run Gmsh as '{}': {source}. {INSTALL}", executable.display())]
+    NotFound {
+        /// The program that was started.
+        executable: PathBuf,
+        /// The error of the operating system.
+        source: io::Error,
+    },
+    /// It starts and ends without doing anything.
+    #[error("Gmsh, run as '{}', does not work: {output}. {INSTALL}", executable.display())]
+    Broken {
+        /// The program that was started.
+        executable: PathBuf,
+        /// The end of its output.
+        output: String,
+    },
+    /// Files cannot be written to or read from the temporary folder.
+    #[error("cannot use a temporary folder for Gmsh: {0}; set TMPDIR to a folder with space")]
+    Folder(io::Error),
+}
+
+const INSTALL: &str = "Install it with `pip install gmsh` and the libraries that it names, or with `apt install gmsh`, or \
+                       set TESDF_GMSH to the path of the program";
+
 /// Why the program did not run to its end.
 #[derive(Debug)]
 pub(crate) enum RunError {
-    /// The program does not exist, or does not start.
-    NotFound(io::Error),
-    /// The temporary folder cannot be used.
-    Folder(io::Error),
+    /// It cannot be used.
+    Program(ProgramError),
     /// The caller asked to stop.
     Cancelled,
     /// The program was ended after the time limit.
@@ -47,13 +73,10 @@ impl Gmsh {
     ///
     /// # Errors
     /// There is no temporary folder.
-    pub fn new(named: Option<&Path>) -> io::Result<Self> {
-        let folder = tempfile::Builder::new().prefix("tesdf-gmsh-").tempdir()?;
+    pub fn new(named: Option<&Path>) -> Result<Self, ProgramError> {
+        let folder = tempfile::Builder::new().prefix("tesdf-gmsh-").tempdir();
+        let folder = folder.map_err(ProgramError::Folder)?;
         Ok(Self { executable: executable(named), folder })
-    }
-
-    pub fn executable(&self) -> &Path {
-        &self.executable
     }
 
     /// The path of a file in the folder.
@@ -61,10 +84,28 @@ impl Gmsh {
         self.folder.path().join(name)
     }
 
+    /// Writes a file into the folder.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<(), ProgramError> {
+        fs::write(self.path(name), content).map_err(ProgramError::Folder)
+    }
+
+    /// Why a run wrote no result: the end of what it printed.
+    ///
+    /// # Errors
+    /// It was not Gmsh that ran.
+    pub fn why_no_result(&self, printed: &Printed) -> Result<String, ProgramError> {
+        let output = printed.last_words();
+        match printed.is_of_gmsh() {
+            true => Ok(output),
+            false => Err(ProgramError::Broken { executable: self.executable.clone(), output }),
+        }
+    }
+
     /// Runs the program in the folder, until it ends.
     pub fn run(&self, arguments: &[&str], limit: Duration, progress: &Progress) -> Result<Printed, RunError> {
-        let log = File::create(self.path(LOG)).map_err(RunError::Folder)?;
-        let log_too = log.try_clone().map_err(RunError::Folder)?;
+        let folder = |e| RunError::Program(ProgramError::Folder(e));
+        let log = File::create(self.path(LOG)).map_err(folder)?;
+        let log_too = log.try_clone().map_err(folder)?;
         let started = Command::new(&self.executable)
             .args(arguments)
             .current_dir(self.folder.path())
@@ -76,12 +117,15 @@ impl Gmsh {
             .stdout(log)
             .stderr(log_too)
             .spawn();
-        let status = wait(started.map_err(RunError::NotFound)?, limit, progress).map_err(RunError::Folder)?;
+        let started = started.map_err(|source| {
+            RunError::Program(ProgramError::NotFound { executable: self.executable.clone(), source })
+        })?;
+        let status = wait(started, limit, progress).map_err(folder)?;
         if progress.is_cancelled() {
             return Err(RunError::Cancelled);
         }
         let status = status.ok_or(RunError::TimeLimit)?;
-        let text = fs::read(self.path(LOG)).map_err(RunError::Folder)?;
+        let text = fs::read(self.path(LOG)).map_err(folder)?;
         Ok(Printed { text: String::from_utf8_lossy(&text).into_owned(), status })
     }
 }
@@ -89,7 +133,7 @@ impl Gmsh {
 impl Printed {
     /// Whether it was Gmsh that ran: it prints "Info" and its version when it starts. A shell, a
     /// loader or an interpreter does not.
-    pub fn is_of_gmsh(&self) -> bool {
+    fn is_of_gmsh(&self) -> bool {
         self.text.contains("Info    :")
     }
 

@@ -4,7 +4,8 @@ use std::array::from_fn;
 use std::collections::VecDeque;
 
 use tesdf::collide::Pose;
-use tesdf::geometry::{Aabb, Triangle, triangles_meet};
+use tesdf::geometry::internal::triangles_meet;
+use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 

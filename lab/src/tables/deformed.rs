@@ -2,7 +2,8 @@
 use tesdf::TeSdf;
 use tesdf::deform::Moved;
 use tesdf::domain::ConformingMesh;
-use tesdf::geometry::{Aabb, orientation};
+use tesdf::geometry::Aabb;
+use tesdf::geometry::internal::orientation;
 use tesdf::glam::{DQuat, DVec3};
 
 use tesdf_cli::terminal::report::Failure;

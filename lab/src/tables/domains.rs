@@ -64,7 +64,7 @@ pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Subject, Fai
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tesdf::geometry::tetrahedron_volume;
+    use tesdf::geometry::internal::tetrahedron_volume;
 
     #[test]
     fn the_boundary_of_the_beam_is_closed_and_holds_its_volume() {

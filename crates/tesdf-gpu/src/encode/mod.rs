@@ -238,7 +238,7 @@ mod tests {
     use tesdf::domain::Cell;
     use tesdf::encode::Threshold;
     use tesdf::encode::internal::Touching;
-    use tesdf::geometry::AabbTree;
+    use tesdf::geometry::internal::AabbTree;
     use tesdf::glam::DVec3;
     use tesdf::mesh::TriangleMesh;
 

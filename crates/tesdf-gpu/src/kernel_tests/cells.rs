@@ -8,7 +8,7 @@ use tesdf::asset::layout::Node;
 use tesdf::collide::Shape;
 use tesdf::domain::Cell;
 use tesdf::encode::{Encoder, Preset};
-use tesdf::geometry::barycentric;
+use tesdf::geometry::internal::barycentric;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 

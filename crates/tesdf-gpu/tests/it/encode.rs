@@ -11,7 +11,8 @@ use tesdf::encode::{
     Domain, EncodeError, EncodeOptions, Encoder, Method, Preset, Processor, Refinement, SampledCell, Sampler,
     Sampling, Surface, Threshold,
 };
-use tesdf::geometry::{Aabb, AabbTree, LocalFrame};
+use tesdf::geometry::Aabb;
+use tesdf::geometry::internal::{AabbTree, LocalFrame};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::verify::{VerifyOptions, verify};
 use tesdf::{Progress, TeSdf};

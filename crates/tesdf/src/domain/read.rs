@@ -3,20 +3,16 @@
 //! Only tetrahedra of four vertices are read. Points, lines and surface elements are skipped and
 //! counted. Other volumes are an error. Memory is allocated for bytes that are there, and never by
 //! a count in a header.
-//!
-//! The parsers are our own. `mshio` 0.4.2 reads MSH 4.1 only, its last release is of 2020, and its
-//! errors are positions in the input of a parser.
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use serde::Serialize;
 
-mod cursor;
 mod error;
-mod gmsh;
 mod tetgen;
 
 use super::TetMesh;
+use crate::mesh::msh::{self, Msh, Wanted};
 pub use error::ReadTetrahedraError;
 use error::malformed;
 
@@ -100,6 +96,12 @@ struct Parsed {
     skipped: Skipped,
 }
 
+fn parse_msh(bytes: &[u8]) -> Result<Parsed, ReadTetrahedraError> {
+    let Msh { nodes, tetrahedra, skipped: [points, lines, surfaces], .. } =
+        msh::read(bytes, Wanted::Tetrahedra)?;
+    Ok(Parsed { vertices: nodes, tetrahedra, skipped: Skipped { points, lines, surfaces } })
+}
+
 /// Reads a file of tetrahedra. Its extension names the format. Of TetGen's pair, either path is
 /// accepted.
 ///
@@ -123,7 +125,7 @@ fn load(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraError> {
         crate::input::read(path).map_err(|source| ReadTetrahedraError::Open { path: path.to_owned(), source })
     };
     let parsed = match format {
-        TetFormat::Msh => gmsh::parse(&bytes(path)?),
+        TetFormat::Msh => parse_msh(&bytes(path)?),
         TetFormat::Node => tetgen::parse(&bytes(path)?, &bytes(&beside(path, TetFormat::Ele))?),
         TetFormat::Ele => tetgen::parse(&bytes(&beside(path, TetFormat::Node))?, &bytes(path)?),
     }?;
@@ -170,7 +172,7 @@ mod tests {
 
     fn samples() -> Vec<(&'static str, &'static [u8], Parse)> {
         let mut all = golden!(
-            gmsh::parse as Parse,
+            parse_msh as Parse,
             "v22.msh",
             "v22_binary.msh",
             "v41.msh",

@@ -1,5 +1,4 @@
-//! Geometry of points, triangles and tetrahedra: closest points, bounds, box trees, exact
-//! predicates, the local frame.
+//! Boxes and triangles, and the closest points of triangles.
 mod aabb;
 mod aabb_tree;
 mod barycentric;
@@ -16,20 +15,29 @@ mod sign_rule;
 pub(crate) mod strategy;
 mod tetrahedron;
 mod triangle;
-mod winding;
+pub(crate) mod winding;
+
+/// What the other crates of this project and its tests use. Not part of the API.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::aabb_tree::{AabbTree, Child};
+    pub use super::barycentric::barycentric;
+    pub use super::crossing::{orientation, perturbed_orientation, signed_crossing};
+    pub use super::frame::LocalFrame;
+    pub use super::meet::triangles_meet;
+    pub use super::polygon_distance::polygon_to_triangle;
+    pub use super::tetrahedron::{tetrahedron_volume, triangle_meets_tetrahedron};
+}
 
 pub use aabb::Aabb;
-pub use aabb_tree::{AabbTree, Child};
-pub use barycentric::barycentric;
-pub use crossing::{normal_signs, orientation, perturbed_orientation, signed_crossing};
-pub use flat::is_flat;
-pub use frame::LocalFrame;
-pub use generalized_winding::{Generalized, GeneralizedWinding, NearWinding};
-pub use meet::{segment_meets_triangle, surely_apart, triangles_meet};
-pub use polygon_distance::polygon_to_triangle;
+pub(crate) use crossing::normal_signs;
+pub(crate) use flat::is_flat;
+pub(crate) use generalized_winding::GeneralizedWinding;
+pub(crate) use internal::*;
+pub(crate) use meet::{segment_meets_triangle, surely_apart};
 pub(crate) use ray::{NearRay, length_and_direction};
-pub use self_overlap::self_overlaps;
+pub(crate) use self_overlap::self_overlaps;
 pub(crate) use sign_rule::SignRule;
-pub use tetrahedron::{tetrahedron_volume, triangle_meets_tetrahedron};
-pub use triangle::{Closest, Feature, Regions, Triangle};
-pub use winding::WindingNumber;
+pub(crate) use triangle::Regions;
+pub use triangle::{Closest, Feature, Triangle};
+pub(crate) use winding::WindingNumber;

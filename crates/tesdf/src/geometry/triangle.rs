@@ -157,7 +157,7 @@ impl Triangle {
 
     /// [`closest`](Self::closest) and [`regions`](Self::regions) of the same point.
     #[inline]
-    pub fn closest_and_regions(&self, p: DVec3) -> (Closest, Regions) {
+    pub(crate) fn closest_and_regions(&self, p: DVec3) -> (Closest, Regions) {
         let relative = Relative::new(self, p);
         (self.closest_seen(p, &relative), self.regions_seen(&relative))
     }
@@ -213,6 +213,7 @@ impl Triangle {
     }
 
     /// The features whose closed regions contain `p`.
+    #[doc(hidden)]
     #[inline]
     pub fn regions(&self, p: DVec3) -> Regions {
         self.regions_seen(&Relative::new(self, p))

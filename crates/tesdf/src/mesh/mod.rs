@@ -3,6 +3,7 @@ mod check;
 mod count;
 mod defect;
 mod hairs;
+pub(crate) mod msh;
 mod other_rules;
 mod polygon;
 mod presented;
@@ -16,6 +17,7 @@ mod weld;
 mod winding;
 mod write;
 
+pub use crate::program::ProgramError;
 pub use check::{BoundaryLoop, CheckReport, check, check_for};
 pub(crate) use check::{FaceClass, Survey, check_and_survey, coordinate_in_range};
 pub use defect::{Defect, DefectKind, Severity};

@@ -1,8 +1,8 @@
 use glam::DVec3;
 
 use super::TriangleMesh;
-pub use crate::geometry::WindingNumber;
 use crate::geometry::signed_crossing;
+pub use crate::geometry::winding::WindingNumber;
 
 impl WindingNumber {
     /// Builds the tree over the faces.

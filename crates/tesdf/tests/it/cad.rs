@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use tesdf::Length;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{
-    CadError, CadOptions, MeshFormat, ReadError, SolidMesh, TriangleMesh, read, read_bytes, read_with, split,
+    CadError, CadOptions, MeshFormat, ProgramError, ReadError, SolidMesh, TriangleMesh, read, read_bytes,
+    read_with, split,
 };
 
 fn data(name: &str) -> PathBuf {
@@ -136,7 +137,8 @@ fn errors_say_what_to_do() {
         assert!(
             matches!(
                 error,
-                ReadError::Cad(CadError::Failed(_) | CadError::Broken { .. }) | ReadError::NoFaces { .. }
+                ReadError::Cad(CadError::Failed(_) | CadError::Program(ProgramError::Broken { .. }))
+                    | ReadError::NoFaces { .. }
             ),
             "{error:?}"
         );

@@ -11,7 +11,8 @@ use tesdf::collide::{
     Shape, clearance, detect,
 };
 use tesdf::encode::{Encoder, Preset};
-use tesdf::geometry::{Triangle, polygon_to_triangle};
+use tesdf::geometry::Triangle;
+use tesdf::geometry::internal::polygon_to_triangle;
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
 use tesdf::{Length, TeSdf};

@@ -10,9 +10,10 @@ use tesdf::domain::gmsh::{
     tetrahedralise_and_report,
 };
 use tesdf::domain::{ConformingError, ConformingMesh};
-use tesdf::geometry::{Aabb, tetrahedron_volume};
+use tesdf::geometry::Aabb;
+use tesdf::geometry::internal::tetrahedron_volume;
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, TriangleMesh, WindingNumber};
+use tesdf::mesh::{ProgramError, SolidMesh, TriangleMesh, WindingNumber};
 use tesdf::{Length, Progress, Side};
 
 fn volume(mesh: &ConformingMesh, side: Side) -> f64 {
@@ -207,7 +208,10 @@ fn missing_libraries_refusals_and_timeouts_are_different_errors() {
     let folder = tempfile::tempdir().unwrap();
     let run = |script: &str| tetrahedralise(&unit_cube(), &stand_in(folder.path(), script)).unwrap_err();
     let error = run("echo 'ImportError: libGLU.so.1: cannot open shared object file' >&2; exit 1");
-    assert!(matches!(error, GmshError::Broken { ref output, .. } if output.contains("libGLU")), "{error}");
+    assert!(
+        matches!(error, GmshError::Program(ProgramError::Broken { ref output, .. }) if output.contains("libGLU")),
+        "{error}"
+    );
     let error =
         run("echo 'Info    : Running'; echo 'Error   : PLC Error: A segment and a facet intersect'; exit 1");
     let GmshError::AllRefused(refused) = error else { panic!("{error}") };

@@ -1,7 +1,8 @@
 //! The roots of a forest, and the tree of boxes that finds the root of a point in a conforming
 //! domain.
 use glam::DVec3;
-use tesdf::geometry::{Aabb, AabbTree, Child};
+use tesdf::geometry::Aabb;
+use tesdf::geometry::internal::{AabbTree, Child};
 use tesdf::query::Arrays;
 
 use crate::kernels::field::shapes::NONE;

@@ -21,8 +21,9 @@ pub struct Nearest {
 pub const FAR: f32 = 1e30;
 
 /// Size of the stack for the face tree, in levels. An asset with a deeper tree cannot be uploaded.
-/// The processor has room for [`AabbTree::MAX_DEPTH`](tesdf::geometry::AabbTree::MAX_DEPTH); here
-/// each thread would pay for levels that no mesh has needed.
+/// The processor has room for
+/// [`AabbTree::MAX_DEPTH`](tesdf::geometry::internal::AabbTree::MAX_DEPTH); here each thread would
+/// pay for levels that no mesh has needed.
 pub const TREE_DEPTH: usize = 48;
 
 const LEAF: u32 = layout::LEAF;

@@ -1,5 +1,5 @@
 //! The least distance between a polygon and a face in closed form, as in
-//! [`tesdf::geometry::polygon_to_triangle`].
+//! [`tesdf::geometry::internal::polygon_to_triangle`].
 use cubecl::prelude::*;
 
 use super::super::broad::ordered_pair::Part;

@@ -1,40 +1,17 @@
-use std::{fmt, path::PathBuf};
+use std::fmt;
 
 use glam::DVec3;
 
 use super::GmshSettings;
 use crate::domain::{ConformingError, ReadTetrahedraError, TetMeshError};
+use crate::program::ProgramError;
 
 /// Why Gmsh did not give tetrahedra.
 #[derive(Debug, thiserror::Error)]
 pub enum GmshError {
-    /// The program does not exist, or does not start.
-    #[error(
-        "cannot run Gmsh as '{}': {source}. Install it with `pip install gmsh` or `apt install gmsh`, or set TESDF_GMSH to \
-         the path of the program",
-        executable.display()
-    )]
-    NotFound {
-        /// The program that was started.
-        executable: PathBuf,
-        /// The error of the operating system.
-        source: std::io::Error,
-    },
-    /// The program starts and ends without doing anything.
-    #[error(
-        "Gmsh, run as '{}', does not work: {output}. Install it with `pip install gmsh` and the libraries that it names, or \
-         with `apt install gmsh`, or set TESDF_GMSH to the path of the program",
-        executable.display()
-    )]
-    Broken {
-        /// The program that was started.
-        executable: PathBuf,
-        /// The end of its output.
-        output: String,
-    },
-    /// Files cannot be written to or read from the temporary folder.
-    #[error("cannot use a temporary folder for Gmsh: {0}; set TMPDIR to a folder with space")]
-    Folder(std::io::Error),
+    /// Gmsh cannot be used.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
     /// The layer around the solid has no width.
     #[error(
         "the band of {width:e} is no layer around a solid with a diagonal of {diagonal:e}; expected a positive length, or no \

@@ -1,6 +1,4 @@
 //! Runs the program on the surface of a solid.
-use std::fs;
-
 use super::{GmshError, GmshOptions, RefusedBecause, input::SURFACE};
 use crate::base::Progress;
 use crate::domain::{TetMesh, read_tetrahedra};
@@ -17,27 +15,19 @@ pub(super) fn run(
     options: &GmshOptions,
     progress: &Progress,
 ) -> Result<Result<TetMesh, RefusedBecause>, GmshError> {
-    let gmsh = Gmsh::new(options.executable.as_deref()).map_err(GmshError::Folder)?;
-    fs::write(gmsh.path(SURFACE), surface).map_err(GmshError::Folder)?;
-    fs::write(gmsh.path(SCRIPT), script).map_err(GmshError::Folder)?;
+    let gmsh = Gmsh::new(options.executable.as_deref())?;
+    gmsh.write(SURFACE, surface)?;
+    gmsh.write(SCRIPT, script)?;
     let arguments = [SCRIPT, "-3", "-format", "msh2", "-bin", "-o", RESULT, "-nt", "1", "-v", "3"];
-    let executable = || gmsh.executable().to_path_buf();
     let printed = match gmsh.run(&arguments, options.time_limit, progress) {
         Ok(printed) => printed,
         Err(RunError::TimeLimit) => return Ok(Err(RefusedBecause::TimeLimit(options.time_limit))),
-        Err(RunError::NotFound(source)) => {
-            return Err(GmshError::NotFound { executable: executable(), source });
-        }
-        Err(RunError::Folder(error)) => return Err(GmshError::Folder(error)),
+        Err(RunError::Program(error)) => return Err(error.into()),
         Err(RunError::Cancelled) => return Err(GmshError::Cancelled),
     };
     let result = gmsh.path(RESULT);
     if !result.exists() {
-        let output = printed.last_words();
-        if !printed.is_of_gmsh() {
-            return Err(GmshError::Broken { executable: executable(), output });
-        }
-        return Ok(Err(RefusedBecause::Gmsh(output)));
+        return Ok(Err(RefusedBecause::Gmsh(gmsh.why_no_result(&printed)?)));
     }
     Ok(read_tetrahedra(&result).map_err(|error| match printed.first_error() {
         // Such a message, for example "no elements in volume", says more than that the file has no

@@ -1,7 +1,8 @@
 use std::path::PathBuf;
 
 use super::TetFormat;
-use crate::{domain::TetMeshError, mesh::Place};
+use crate::domain::TetMeshError;
+use crate::mesh::{Place, msh::MshError};
 
 /// Why a file does not give tetrahedra.
 #[derive(Debug, thiserror::Error)]
@@ -60,6 +61,18 @@ pub enum ReadTetrahedraError {
         /// The error of the mesh.
         source: TetMeshError,
     },
+}
+
+impl From<MshError> for ReadTetrahedraError {
+    fn from(error: MshError) -> Self {
+        let format = TetFormat::Msh;
+        match error {
+            MshError::Malformed { place, found, help } => Self::Malformed { format, place, found, help },
+            MshError::Volume { place, element, kind } => {
+                Self::Element { format, place, element, kind: kind.into() }
+            }
+        }
+    }
 }
 
 /// An error about the bytes of a format.

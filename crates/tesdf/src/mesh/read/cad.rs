@@ -2,12 +2,14 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::Place;
 use crate::base::Length;
+use crate::program::ProgramError;
 
 #[cfg(feature = "gmsh")]
 mod by_gmsh;
 #[cfg(feature = "gmsh")]
-mod msh;
+mod surface;
 
 #[cfg(feature = "gmsh")]
 pub(super) use by_gmsh::parse;
@@ -43,29 +45,9 @@ impl Default for CadOptions {
 /// Why Gmsh gave no triangles of a CAD file.
 #[derive(Debug, thiserror::Error)]
 pub enum CadError {
-    /// The program does not exist, or does not start.
-    #[error(
-        "CAD files are read by Gmsh, and it cannot be run as '{}': {source}. {}",
-        executable.display(),
-        INSTALL
-    )]
-    NotFound {
-        /// The program that was started.
-        executable: PathBuf,
-        /// The error of the operating system.
-        source: std::io::Error,
-    },
-    /// The program starts and ends without doing anything.
-    #[error("CAD files are read by Gmsh, and '{}' does not work: {output}. {}", executable.display(), INSTALL)]
-    Broken {
-        /// The program that was started.
-        executable: PathBuf,
-        /// The end of its output.
-        output: String,
-    },
-    /// Files cannot be written to or read from the temporary folder.
-    #[error("cannot use a temporary folder for Gmsh: {0}; set TMPDIR to a folder with space")]
-    Folder(std::io::Error),
+    /// Gmsh cannot be used.
+    #[error("CAD files are read by Gmsh: {0}; or export STL, 3MF or glTF from the CAD program")]
+    Program(#[from] ProgramError),
     /// A length is no length.
     #[error("the {what} of {found} is no length; expected a positive one")]
     Length {
@@ -81,10 +63,10 @@ pub enum CadError {
     #[error("Gmsh gave no triangles: {0}; open the file in a CAD program, or export it again")]
     Failed(String),
     /// The output of Gmsh is not what was expected.
-    #[error("the mesh that Gmsh wrote cannot be read: line {line}: {found}; try Gmsh 4.15")]
+    #[error("the mesh that Gmsh wrote cannot be read: {place}: {found}; try Gmsh 4.15")]
     Output {
-        /// Line of the mesh file, 1-based.
-        line: u64,
+        /// The place in the mesh file.
+        place: Place,
         /// The content found there.
         found: String,
     },
@@ -102,6 +84,3 @@ pub enum CadError {
         turn: u32,
     },
 }
-
-const INSTALL: &str = "Install it with `pip install gmsh` or `apt install gmsh`, or set TESDF_GMSH to the path of the \
-                       program; or export STL, 3MF or glTF from the CAD program";

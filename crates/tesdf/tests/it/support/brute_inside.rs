@@ -2,7 +2,8 @@
 use std::f64::consts::PI;
 
 use tesdf::base::InsideRule;
-use tesdf::geometry::{Triangle, perturbed_orientation};
+use tesdf::geometry::Triangle;
+use tesdf::geometry::internal::perturbed_orientation;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{Topology, TriangleMesh, WindingNumber};
 

@@ -2,7 +2,7 @@ use bytemuck::Pod;
 use tesdf::TeSdf;
 use tesdf::asset::layout::{self, List, Node};
 use tesdf::domain::{Cell, DomainCube};
-use tesdf::geometry::LocalFrame;
+use tesdf::geometry::internal::LocalFrame;
 use tesdf::glam::DVec3;
 
 use super::random::Random;

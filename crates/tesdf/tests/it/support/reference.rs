@@ -1,4 +1,5 @@
-use tesdf::geometry::{Aabb, AabbTree, Closest, LocalFrame, Triangle};
+use tesdf::geometry::internal::{AabbTree, LocalFrame};
+use tesdf::geometry::{Aabb, Closest, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{TriangleMesh, WindingNumber};
 

@@ -1,7 +1,8 @@
 use tesdf::Side;
 use tesdf::asset::layout::{Label, Node};
 use tesdf::encode::internal::PAD;
-use tesdf::geometry::{Aabb, Triangle, triangle_meets_tetrahedron};
+use tesdf::geometry::internal::triangle_meets_tetrahedron;
+use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 
 use super::cells::{Cells, Located, barycentric, combine, lattice};

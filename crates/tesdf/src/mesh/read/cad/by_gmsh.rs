@@ -1,12 +1,12 @@
 //! Runs Gmsh on a CAD file.
 use std::fs;
 
-use super::msh::{Surface, read};
+use super::surface::Surface;
 use super::{CadError, CadOptions};
 use crate::base::{Length, Progress};
 use crate::input;
 use crate::mesh::read::{MeshFormat, Places, RawMesh, ReadError};
-use crate::program::{Gmsh, Printed, RunError};
+use crate::program::{Gmsh, Printed, ProgramError, RunError};
 
 const SCRIPT: &str = "surface.geo";
 const RESULT: &str = "surface.msh";
@@ -28,9 +28,9 @@ pub(in crate::mesh::read) fn parse(
             return Err(CadError::Length { what, found }.into());
         }
     }
-    let gmsh = Gmsh::new(options.executable.as_deref()).map_err(CadError::Folder)?;
+    let gmsh = Gmsh::new(options.executable.as_deref()).map_err(CadError::Program)?;
     let model = format!("model.{}", format.extension());
-    fs::write(gmsh.path(&model), bytes).map_err(CadError::Folder)?;
+    gmsh.write(&model, bytes).map_err(CadError::Program)?;
     let mut turn = first_turn(options.deviation);
     let mut runs = 1;
     let (surface, printed, deviation) = loop {
@@ -99,12 +99,10 @@ fn run(
          Mesh.MeshSizeMax = {size};\nMesh.MeshSizeFromCurvature = {turn};\nMesh.SaveAll = 1;\n\
          Mesh.MshFileVersion = 4.1;\nMesh.Binary = 0;\n"
     );
-    fs::write(gmsh.path(SCRIPT), script).map_err(CadError::Folder)?;
+    gmsh.write(SCRIPT, script).map_err(CadError::Program)?;
     let arguments = [SCRIPT, "-2", "-order", "2", "-o", RESULT, "-nt", "1", "-v", "4"];
-    let executable = || gmsh.executable().to_path_buf();
     let printed = gmsh.run(&arguments, options.time_limit, &Progress::default()).map_err(|e| match e {
-        RunError::NotFound(source) => CadError::NotFound { executable: executable(), source },
-        RunError::Folder(error) => CadError::Folder(error),
+        RunError::Program(error) => CadError::Program(error),
         RunError::TimeLimit => CadError::TimeLimit(options.time_limit),
         // Nobody can cancel this run.
         RunError::Cancelled => CadError::Failed("it was cancelled".into()),
@@ -114,18 +112,13 @@ fn run(
         return Err(CadError::Failed(said).into());
     }
     if !result.exists() {
-        let output = printed.last_words();
-        let broken = !printed.is_of_gmsh();
-        return Err(match broken {
-            true => CadError::Broken { executable: executable(), output },
-            false => CadError::Failed(output),
-        }
-        .into());
+        return Err(CadError::Failed(gmsh.why_no_result(&printed).map_err(CadError::Program)?).into());
     }
-    let bytes = input::read(&result).map_err(CadError::Folder)?;
-    let surface = read(&bytes)?;
+    let folder = |e| CadError::Program(ProgramError::Folder(e));
+    let bytes = input::read(&result).map_err(folder)?;
+    let surface = Surface::read(&bytes)?;
     // The next run must not find this file.
-    fs::remove_file(&result).map_err(CadError::Folder)?;
+    fs::remove_file(&result).map_err(folder)?;
     Ok((surface, printed))
 }
 

@@ -1,12 +1,67 @@
-//! Reads Gmsh's MSH 2.2 and 4.1, ASCII and binary. Only the sections of nodes and elements are
-//! read.
-use std::collections::HashMap;
+//! Reads Gmsh's MSH 2.2 and 4.1, ASCII and binary. Only the sections of entities, nodes and
+//! elements are read. Memory is allocated for bytes that are there, and never by a count in a file.
+use std::collections::{HashMap, HashSet};
 
-use super::cursor::{Cursor, Encoding};
-use super::{Parsed, ReadTetrahedraError, TetFormat};
-use crate::mesh::text::{shown, words};
+use glam::DVec3;
 
-type Result<T> = std::result::Result<T, ReadTetrahedraError>;
+mod cursor;
+
+use super::Place;
+use super::text::{shown, words};
+use cursor::{Cursor, Encoding};
+
+/// What is read of a file. Other elements are skipped and counted.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Wanted {
+    /// Tetrahedra of four nodes. Other volumes are an error.
+    Tetrahedra,
+    /// The surfaces and volumes of a model in version 4.1, and triangles of second order. Other
+    /// surface elements are an error.
+    Surfaces,
+}
+
+/// The content of a file. Corners are valid indices of `nodes`.
+#[derive(Default)]
+pub(crate) struct Msh {
+    /// Nodes, in the order of the file.
+    pub nodes: Vec<DVec3>,
+    /// Corners of the tetrahedra, in the order of the file.
+    pub tetrahedra: Vec<[u32; 4]>,
+    /// For each triangle the number of its surface, its corners, and the middles of its edges,
+    /// beginning with the edge from corner 0 to 1.
+    pub triangles: Vec<(i32, [u32; 6])>,
+    /// Numbers of the surfaces of the model.
+    pub surfaces: Vec<i32>,
+    /// For each volume of the model its number, and the numbers of its surfaces, which may have a
+    /// sign.
+    pub volumes: Vec<(i32, Vec<i32>)>,
+    /// Numbers of the skipped points, lines and surface elements.
+    pub skipped: [usize; 3],
+}
+
+/// Why a file cannot be read.
+pub(crate) enum MshError {
+    /// The bytes do not follow the rules of the format.
+    Malformed {
+        /// The place in the file.
+        place: Place,
+        /// What was found there.
+        found: String,
+        /// What was expected, or what to do.
+        help: String,
+    },
+    /// An element has a volume and is not a tetrahedron of four nodes.
+    Volume {
+        /// The place in the file.
+        place: Place,
+        /// The number of the element in the file.
+        element: u64,
+        /// The kind of the element, such as `a hexahedron`.
+        kind: &'static str,
+    },
+}
+
+type Result<T> = std::result::Result<T, MshError>;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Version {
@@ -17,20 +72,22 @@ enum Version {
 struct Reader<'a> {
     cursor: Cursor<'a>,
     version: Version,
-    /// The index of each node in `parsed.vertices`.
+    wanted: Wanted,
+    /// The index of each node in `msh.nodes`.
     nodes: HashMap<u64, u32>,
-    parsed: Parsed,
+    msh: Msh,
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Parsed> {
-    let mut cursor = Cursor::new(bytes, TetFormat::Msh);
+pub(crate) fn read(bytes: &[u8], wanted: Wanted) -> Result<Msh> {
+    let mut cursor = Cursor::new(bytes);
     let version = header(&mut cursor)?;
-    let mut reader = Reader { cursor, version, nodes: HashMap::new(), parsed: Parsed::default() };
+    let mut reader = Reader { cursor, version, wanted, nodes: HashMap::new(), msh: Msh::default() };
     let mut has_elements = false;
     loop {
         reader.cursor.skip_space();
         match reader.cursor.rest_of_line() {
             b"" => break,
+            b"$Entities" if wanted == Wanted::Surfaces => reader.entities()?,
             b"$Nodes" => reader.nodes()?,
             b"$Elements" => {
                 has_elements = true;
@@ -52,7 +109,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed> {
     if !has_elements {
         return Err(reader.cursor.error("the file has no $Elements", "is the file cut short?"));
     }
-    Ok(reader.parsed)
+    Ok(reader.msh)
 }
 
 fn header(cursor: &mut Cursor<'_>) -> Result<Version> {
@@ -131,6 +188,46 @@ impl Reader<'_> {
             .map_err(|_| self.cursor.error(format!("{id} where {what} should be"), "expected a positive id"))
     }
 
+    /// The surfaces and volumes of the model.
+    fn entities(&mut self) -> Result<()> {
+        let mut counts = [0; 4];
+        for count in &mut counts {
+            *count = self.cursor.size("the number of entities")?;
+        }
+        let mut surfaces = HashSet::new();
+        for (dimension, count) in counts.into_iter().enumerate() {
+            for _ in 0..count {
+                let number = self.cursor.int("the number of an entity")?;
+                // A point has its position, others have their bounds.
+                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                    self.cursor.double("a bound of an entity")?;
+                }
+                for _ in 0..self.cursor.size("the number of physical groups")? {
+                    self.cursor.int("a physical group")?;
+                }
+                let mut around = Vec::new();
+                for _ in 0..if dimension == 0 { 0 } else { self.cursor.size("the number of sides")? } {
+                    around.push(self.cursor.int("a side of an entity")?);
+                }
+                match dimension {
+                    2 => {
+                        surfaces.insert(number);
+                        self.msh.surfaces.push(number);
+                    }
+                    3 => match around.iter().find(|side| !surfaces.contains(&side.saturating_abs())) {
+                        Some(side) => {
+                            let found = format!("volume {number} has the surface {side}, which is not there");
+                            return Err(self.cursor.error(found, "expected surfaces before volumes"));
+                        }
+                        None => self.msh.volumes.push((number, around)),
+                    },
+                    _ => {}
+                }
+            }
+        }
+        end(&mut self.cursor, b"$EndEntities")
+    }
+
     fn nodes(&mut self) -> Result<()> {
         match self.version {
             Version::V2 => {
@@ -180,12 +277,12 @@ impl Reader<'_> {
             let found = format!("node {id} has {} = {}", ['x', 'y', 'z'][axis], p[axis]);
             return Err(self.cursor.error(found, "coordinates must be finite"));
         }
-        // Ids beyond 32 bits would need a file of 100 GB. The limit of `TetMesh` is below that.
-        let at = self.parsed.vertices.len() as u32;
+        // Ids beyond 32 bits would need a file of 100 GB. Meshes have a limit below that.
+        let at = self.msh.nodes.len() as u32;
         if self.nodes.insert(id, at).is_some() {
             return Err(self.cursor.error(format!("node {id} is there twice"), "expected different numbers"));
         }
-        self.parsed.vertices.push(p);
+        self.msh.nodes.push(p);
         Ok(())
     }
 
@@ -196,7 +293,7 @@ impl Reader<'_> {
                     let id = self.id("an element's number")?;
                     let kind = self.cursor.int("an element's type")?;
                     let tags = self.cursor.int("the number of tags")?;
-                    self.element(id, kind, tags)?;
+                    self.element(id, kind, 0, tags)?;
                 }
             }
             (Version::V2, _) => {
@@ -212,7 +309,7 @@ impl Reader<'_> {
                     left -= follow as u64;
                     for _ in 0..follow {
                         let id = self.id("an element's number")?;
-                        self.element(id, kind, tags)?;
+                        self.element(id, kind, 0, tags)?;
                     }
                 }
             }
@@ -223,11 +320,11 @@ impl Reader<'_> {
                 }
                 for _ in 0..blocks {
                     self.cursor.int("the dimension of an entity")?;
-                    self.cursor.int("the number of an entity")?;
+                    let entity = self.cursor.int("the number of an entity")?;
                     let kind = self.cursor.int("an element type")?;
                     for _ in 0..self.cursor.size("the number of elements in a block")? {
                         let id = self.id("an element's number")?;
-                        self.element(id, kind, 0)?;
+                        self.element(id, kind, entity, 0)?;
                     }
                 }
             }
@@ -236,49 +333,56 @@ impl Reader<'_> {
     }
 
     /// Reads the tags and the nodes of an element.
-    fn element(&mut self, element: u64, kind: i32, tags: i32) -> Result<()> {
+    fn element(&mut self, element: u64, kind: i32, entity: i32, tags: i32) -> Result<()> {
         for _ in 0..tags {
             self.cursor.int("a tag")?;
         }
-        let skipped = &mut self.parsed.skipped;
-        let nodes = match element_kind(kind) {
-            Some(Kind::Tetrahedron) => {
-                let mut corners = [0; 4];
-                for corner in &mut corners {
-                    let node = self.id("a node of an element")?;
-                    *corner = *self.nodes.get(&node).ok_or_else(|| {
-                        let found = format!("element {element} uses node {node}, which is not in $Nodes");
-                        self.cursor.error(found, "expected nodes before the elements: is the file cut short?")
-                    })?;
-                }
-                self.parsed.tetrahedra.push(corners);
+        let (dimension, nodes) = match (element_kind(kind), self.wanted) {
+            (Some(Kind::Tetrahedron), Wanted::Tetrahedra) => {
+                let corners = self.corners(element)?;
+                self.msh.tetrahedra.push(corners);
                 return Ok(());
             }
-            Some(Kind::Point(nodes)) => {
-                skipped.points += 1;
-                nodes
+            (Some(Kind::Surface(6)), Wanted::Surfaces) => {
+                let corners = self.corners(element)?;
+                self.msh.triangles.push((entity, corners));
+                return Ok(());
             }
-            Some(Kind::Line(nodes)) => {
-                skipped.lines += 1;
-                nodes
+            (Some(Kind::Surface(_)), Wanted::Surfaces) => {
+                let found = format!("element {element} is of type {kind}");
+                return Err(self.cursor.error(found, "expected triangles of second order, type 9"));
             }
-            Some(Kind::Surface(nodes)) => {
-                skipped.surfaces += 1;
-                nodes
+            (Some(Kind::Point(nodes)), _) => (0, nodes),
+            (Some(Kind::Line(nodes)), _) => (1, nodes),
+            (Some(Kind::Surface(nodes)), _) => (2, nodes),
+            (Some(Kind::Tetrahedron), Wanted::Surfaces) => {
+                return Err(MshError::Volume { place: self.cursor.place(), element, kind: "a tetrahedron" });
             }
-            Some(Kind::Volume(kind)) => {
-                let (format, place, kind) = (TetFormat::Msh, self.cursor.place(), kind.to_owned());
-                return Err(ReadTetrahedraError::Element { format, place, element, kind });
+            (Some(Kind::Volume(kind)), _) => {
+                return Err(MshError::Volume { place: self.cursor.place(), element, kind });
             }
-            None => {
+            (None, _) => {
                 let found = format!("element {element} is of the unknown type {kind}");
                 return Err(self.cursor.error(found, "expected tetrahedra, type 4"));
             }
         };
+        self.msh.skipped[dimension] += 1;
         for _ in 0..nodes {
             self.id("a node of an element")?;
         }
         Ok(())
+    }
+
+    fn corners<const N: usize>(&mut self, element: u64) -> Result<[u32; N]> {
+        let mut corners = [0; N];
+        for corner in &mut corners {
+            let node = self.id("a node of an element")?;
+            *corner = *self.nodes.get(&node).ok_or_else(|| {
+                let found = format!("element {element} uses node {node}, which is not in $Nodes");
+                self.cursor.error(found, "expected nodes before the elements: is the file cut short?")
+            })?;
+        }
+        Ok(corners)
     }
 }
 
@@ -316,4 +420,56 @@ fn element_kind(kind: i32) -> Option<Kind> {
         7 | 14 | 19 => Kind::Volume("a pyramid"),
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle of second order on surface 5, which bounds volume 2.
+    const MODEL: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n1 0 1 1\n7 0 0 0 0\n\
+        5 0 0 0 1 1 0 1 3 0\n2 0 0 0 1 1 1 0 1 -5\n$EndEntities\n$Nodes\n1 6 1 6\n2 5 0 6\n1\n2\n3\n4\n5\n6\n\
+        0 0 0\n1 0 0\n0 1 0\n.5 0 0\n.5 .5 0\n0 .5 0\n$EndNodes\n$Elements\n1 1 1 1\n2 5 9 1\n1 1 2 3 4 5 6\n$EndElements\n";
+
+    fn surfaces(text: &str) -> std::result::Result<Msh, String> {
+        read(text.as_bytes(), Wanted::Surfaces).map_err(|e| match e {
+            MshError::Malformed { place, found, help } => format!("{place}: {found}; {help}"),
+            MshError::Volume { place, element, kind } => format!("{place}: element {element} is {kind}"),
+        })
+    }
+
+    #[test]
+    fn surfaces_of_a_model_are_read() {
+        let msh = surfaces(MODEL).unwrap();
+        assert_eq!((msh.surfaces, msh.volumes), (vec![5], vec![(2, vec![-5])]));
+        assert_eq!((msh.triangles, msh.nodes.len()), (vec![(5, [0, 1, 2, 3, 4, 5])], 6));
+        for (from, to, expected) in [
+            (" 1 -5\n", " 1 -6\n", "line 8: volume 2 has the surface -6"),
+            ("2 5 9 1", "2 5 2 1", "line 29: element 1 is of type 2"),
+            ("2 5 9 1", "3 2 4 1", "line 29: element 1 is a tetrahedron"),
+            ("1 2 3 4 5 6\n$End", "1 2 3 4 5 8\n$End", "line 29: element 1 uses node 8"),
+        ] {
+            let error = surfaces(&MODEL.replace(from, to)).map(|_| ()).unwrap_err();
+            assert!(error.starts_with(expected), "{error}");
+        }
+    }
+
+    /// Checks that a file that is cut short is refused, and that any count may have any value.
+    #[test]
+    fn cut_and_changed_models_are_refused() {
+        for end in 0..MODEL.len() - 1 {
+            assert!(surfaces(&MODEL[..end]).is_err(), "the first {end} bytes");
+        }
+        let words: Vec<&str> = MODEL.split_inclusive([' ', '\n']).collect();
+        for (at, word) in words.iter().enumerate() {
+            for huge in ["4294967295", "18446744073709551615", "-1"] {
+                let mut changed = words.clone();
+                let word = format!("{huge}{}", &word[word.len() - 1..]);
+                changed[at] = &word;
+                if let Ok(msh) = surfaces(&changed.concat()) {
+                    assert!(msh.nodes.len() <= 6 && msh.triangles.len() <= 1);
+                }
+            }
+        }
+    }
 }

@@ -1,8 +1,7 @@
 //! Reads numbers from text or binary data, with the place of each number.
 use glam::DVec3;
 
-use super::{ReadTetrahedraError, TetFormat, malformed};
-use crate::mesh::{Place, text::shown};
+use super::{MshError, Place, shown};
 
 /// How numbers are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,13 +21,12 @@ pub(super) struct Cursor<'a> {
     at: usize,
     /// Line of the next byte, 1-based.
     line: u64,
-    format: TetFormat,
     pub encoding: Encoding,
 }
 
 impl<'a> Cursor<'a> {
-    pub fn new(bytes: &'a [u8], format: TetFormat) -> Self {
-        Self { bytes, at: 0, line: 1, format, encoding: Encoding::Ascii }
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0, line: 1, encoding: Encoding::Ascii }
     }
 
     /// The line in a text file, or the byte in a binary file.
@@ -39,8 +37,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    pub fn error(&self, found: impl Into<String>, help: impl Into<String>) -> ReadTetrahedraError {
-        malformed(self.format, self.place(), found, help)
+    pub fn error(&self, found: impl Into<String>, help: impl Into<String>) -> MshError {
+        MshError::Malformed { place: self.place(), found: found.into(), help: help.into() }
     }
 
     fn advance(&mut self, to: usize) -> &'a [u8] {
@@ -84,7 +82,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    fn take<const N: usize>(&mut self, what: &str) -> Result<[u8; N], ReadTetrahedraError> {
+    fn take<const N: usize>(&mut self, what: &str) -> Result<[u8; N], MshError> {
         match self.bytes[self.at..].first_chunk::<N>() {
             Some(chunk) => {
                 self.at += N;
@@ -100,7 +98,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    fn parse<T: std::str::FromStr>(&mut self, what: &str, kind: &str) -> Result<T, ReadTetrahedraError> {
+    fn parse<T: std::str::FromStr>(&mut self, what: &str, kind: &str) -> Result<T, MshError> {
         let word = self.word();
         std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()).ok_or_else(|| match word {
             b"" => self.error(
@@ -112,7 +110,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A whole number. It has four bytes in binary data.
-    pub fn int(&mut self, what: &str) -> Result<i32, ReadTetrahedraError> {
+    pub fn int(&mut self, what: &str) -> Result<i32, MshError> {
         match self.encoding {
             Encoding::Ascii => self.parse(what, "a whole number"),
             _ => Ok(i32::from_le_bytes(self.take(what)?)),
@@ -120,7 +118,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A count or an id. It has eight bytes in binary data.
-    pub fn size(&mut self, what: &str) -> Result<u64, ReadTetrahedraError> {
+    pub fn size(&mut self, what: &str) -> Result<u64, MshError> {
         match self.encoding {
             Encoding::Ascii => self.parse(what, "a whole number that is not negative"),
             _ => Ok(u64::from_le_bytes(self.take(what)?)),
@@ -128,7 +126,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A floating-point number. It has eight bytes in binary data.
-    pub fn double(&mut self, what: &str) -> Result<f64, ReadTetrahedraError> {
+    pub fn double(&mut self, what: &str) -> Result<f64, MshError> {
         match self.encoding {
             Encoding::Ascii => self.parse(what, "a decimal number such as -1.5e-3"),
             _ => Ok(f64::from_le_bytes(self.take(what)?)),
@@ -136,7 +134,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Three floating-point numbers.
-    pub fn point(&mut self) -> Result<DVec3, ReadTetrahedraError> {
+    pub fn point(&mut self) -> Result<DVec3, MshError> {
         Ok(DVec3::new(self.double("x")?, self.double("y")?, self.double("z")?))
     }
 }
