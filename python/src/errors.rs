@@ -71,7 +71,7 @@ impl Error {
                 SaveError::ReadOnly { .. } => PyPermissionError::new_err(self.text()),
                 SaveError::NoFolder { .. } => PyFileNotFoundError::new_err(self.text()),
                 SaveError::IsFolder { .. } => PyIsADirectoryError::new_err(self.text()),
-                SaveError::Input { .. } | SaveError::Busy { .. } => PyOSError::new_err(self.text()),
+                _ => PyOSError::new_err(self.text()),
             },
             Self::Scene(SceneError::Read { ref source, .. })
             | Self::Record(_, RecordError::Read { ref source, .. }) => system(source, self.text()),

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 /// Why a `.tesdf` file cannot be written, opened or trusted.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AssetError {
     /// The file cannot be written.
     #[cfg(feature = "encode")]

@@ -1,9 +1,6 @@
 //! The JSON header.
 //!
-//! It is written here and not by the `safetensors` crate. That crate keeps metadata in a `HashMap`,
-//! whose order differs from run to run, and the same mesh must give the same bytes. It is read here
-//! too: the errors of that crate do not name the section, and of two entries with one name it takes
-//! the last.
+//! `docs/architecture.md` says why it is not written and read by the crate `safetensors`.
 use std::collections::BTreeMap;
 use std::fmt;
 

@@ -7,6 +7,7 @@ use crate::named;
 /// A set of options by name: a balance of memory and speed, or the options of the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Preset {
     /// Few faces for each query.
     #[default]

@@ -14,6 +14,7 @@ pub const FARTHEST: f64 = 2.0;
 
 /// Why vertices cannot be moved. Nothing has moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DeformError {
     /// The asset has the bisection domain, whose cells do not follow the surface.
     #[error(

@@ -19,6 +19,7 @@ use error::malformed;
 /// A format of tetrahedra that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum TetFormat {
     /// Gmsh's MSH 2.2 and 4.1, ASCII and binary.
     Msh,

@@ -21,6 +21,7 @@ pub struct TetMesh {
 
 /// Why vertices and corner ids do not make a [`TetMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TetMeshError {
     /// There is no tetrahedron.
     #[error("there are no tetrahedra; expected at least one: is this the mesh of a surface?")]

@@ -114,6 +114,7 @@ pub struct EncodeChoices {
 
 /// Choices that exclude each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChoiceError {
     /// A preset of the sampled encoder together with the certified encoder.
     #[error("encoder `certified`: the preset is one of the encoder `sampled`; leave one of them out")]
@@ -144,6 +145,7 @@ pub enum ChoiceError {
 
 /// Why the tetrahedra of the chosen domain could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DomainError {
     /// The library was built without the feature that runs Gmsh.
     #[error("tesdf was built without the feature `gmsh`; build it with it, or give a file of tetrahedra")]

@@ -5,6 +5,7 @@ use crate::verify::Worst;
 
 /// Why a solid cannot be encoded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EncodeError {
     /// [`Progress::cancel`](crate::base::Progress::cancel) was called.
     #[error("the encoding was cancelled")]

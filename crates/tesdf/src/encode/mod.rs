@@ -24,6 +24,7 @@ mod hints;
 mod holds;
 pub(crate) mod lists;
 mod pipeline;
+mod placed;
 mod plane_rule;
 #[cfg(test)]
 mod random_tetrahedra;

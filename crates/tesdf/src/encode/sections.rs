@@ -1,6 +1,6 @@
 //! The sections of an asset, and what it says about itself.
 use super::assemble::Forest;
-use super::pipeline::{Placed, Request};
+use super::placed::{Placed, Request};
 use super::roots::Domain;
 use crate::asset::about::About;
 use crate::asset::layout::{self, SignHints, TreeChild};

@@ -35,6 +35,7 @@ pub enum Severity {
 /// Kinds of defects, in the order in which reports list them: causes before consequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum DefectKind {
     /// A coordinate or the size of the mesh is outside the range in which computations are exact.
     OutOfRange,

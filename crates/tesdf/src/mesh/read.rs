@@ -6,12 +6,7 @@
 //! triangulation. Memory is allocated only for bytes that are present, never by a count in a
 //! header.
 //!
-//! The STL, OBJ, PLY and OFF parsers are our own because an error must name the line or element at
-//! fault. `tobj` 4.0.5 has neither in its `LoadError`. `stl_io` 0.11.0 gives an `io::Error` without
-//! the line. `ply-rs-bw` 4.0.1 names a line that does not parse, but its rows do not carry their
-//! position: an index out of range has no place, and data after the last row remain unnoticed.
-//! glTF's JSON is parsed and validated by `gltf-json`, which names the path
-//! (`meshes[0].primitives[0].indices`).
+//! `docs/architecture.md` says why the parsers are our own.
 mod assemble;
 mod cad;
 mod error;
@@ -19,6 +14,7 @@ mod error;
 mod gltf;
 mod obj;
 mod off;
+mod place;
 mod ply;
 mod sniff;
 mod stl;
@@ -35,11 +31,13 @@ use super::TriangleMesh;
 use crate::input;
 use assemble::{Places, RawMesh, assemble};
 pub use cad::{CadError, CadOptions};
-pub use error::{Place, ReadError};
+pub use error::ReadError;
+pub use place::Place;
 
 /// A mesh file format that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum MeshFormat {
     /// Stereolithography, binary or ASCII (told apart by content).
     Stl,

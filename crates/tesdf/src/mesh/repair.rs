@@ -39,6 +39,7 @@ pub struct Repaired {
 
 /// Why [`repair`] gives no mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RepairError {
     /// A tolerance is not a finite positive number.
     #[error("the {name} is {value}; expected a finite number above 0")]

@@ -15,6 +15,7 @@ pub struct TriangleMesh {
 
 /// Why vertices and faces do not make a [`TriangleMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// A face uses a vertex that does not exist.
     #[error("face {face} uses vertex {index}, but there are {vertices} vertices (0-based)")]

@@ -7,6 +7,7 @@ use crate::save::{SaveError, save_atomic};
 
 /// A mesh file format that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WriteFormat {
     /// Binary little-endian PLY with `double` coordinates. Keeps every bit.
     Ply,
@@ -41,6 +42,7 @@ impl WriteFormat {
 
 /// Why a mesh was not written. The file at the path is then unchanged.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WriteError {
     /// The extension names no format that can be written.
     #[error("{}: the extension names no mesh format that can be written; expected one of .ply, .obj, .stl", path.display())]

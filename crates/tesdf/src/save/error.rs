@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 /// Why an output is refused or cannot be written. A regular file at its path is then unchanged.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SaveError {
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]

@@ -70,6 +70,7 @@ pub struct VerifyReport {
 
 /// Why an asset cannot be compared with brute force.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VerifyError {
     /// The mesh in the asset is not valid.
     #[error("the mesh in the file is not valid: {0}")]

@@ -4,6 +4,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
+use tesdf::asset::SectionSpec;
+use tesdf::asset::layout::SECTIONS;
+
 /// Folders with files that others wrote or that are made.
 const NOT_OURS: [&str; 5] = ["target", ".git", "corpus", "licences", "node_modules"];
 
@@ -112,4 +115,27 @@ fn links_and_named_files_exist() {
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
     // Else nothing was read.
     assert!(links > 40 && names > 40, "{links} links, {names} names");
+}
+
+/// The table of sections in the documents has those of the layout, in their order.
+#[test]
+fn the_documented_sections_are_those_of_the_file() {
+    let text = fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let numbers = |spec: &SectionSpec| match spec.columns {
+        1 => format!("{} [", spec.element.name().to_lowercase()),
+        columns => format!("{} [*, {columns}]", spec.element.name().to_lowercase()),
+    };
+    let expected: Vec<_> = SECTIONS.iter().map(|spec| (spec.name.to_owned(), numbers(spec))).collect();
+    let documented = |line: &str| {
+        let (name, rest) = line.strip_prefix("    ")?.split_once(' ')?;
+        let (element, shape) = rest.trim_start().split_once(" [")?;
+        let is_section =
+            name.contains('.') && SECTIONS.iter().any(|s| s.element.name().to_lowercase() == element);
+        let numbers = match shape.split(']').next()?.split_once(", ") {
+            Some((_, columns)) => format!("{element} [*, {columns}]"),
+            None => format!("{element} ["),
+        };
+        is_section.then(|| (name.to_owned(), numbers))
+    };
+    assert_eq!(text.lines().filter_map(documented).collect::<Vec<_>>(), expected);
 }

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
+use crate::support::parts::{Parts, Turn};
 use crate::support::shapes::Shape;
 use tesdf::TeSdf;
 use tesdf::encode::{Encoder, Preset};
@@ -67,19 +68,10 @@ fn a_long_prism_of_many_sides() {
     assert_small(&encoded(vertices, sides.chain(ends).collect()));
 }
 
-fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
-    let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    (
-        (0..8).map(corner).collect(),
-        sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-    )
-}
-
 #[test]
 fn a_cube_with_a_corner_far_away() {
     for far in [DVec3::splat(1e12), DVec3::new(1e7, 1.0, 1.0)] {
-        let (mut vertices, faces) = cube();
+        let Parts { mut vertices, faces } = Parts::default().cube(DVec3::ZERO, 1.0, Turn::Outward);
         vertices[7] = far;
         encoded(vertices, faces);
     }
@@ -88,7 +80,7 @@ fn a_cube_with_a_corner_far_away() {
 #[test]
 fn rods() {
     for length in [1e3, 1e6, 1e9, 1e12] {
-        let (vertices, faces) = cube();
+        let Parts { vertices, faces } = Parts::default().cube(DVec3::ZERO, 1.0, Turn::Outward);
         let long = vertices.into_iter().map(|v| v * DVec3::new(length, 1.0, 1.0));
         encoded(long.collect(), faces);
     }

@@ -1,22 +1,14 @@
 //! The defects that `check` finds and the meshes that `SolidMesh` accepts, for every readable file
 //! of `data/bad`.
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
+use crate::support::meshes::{bad, load};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{
     CheckReport, Defect, DefectKind, RepairOptions, Severity, SolidMesh, TriangleMesh, check, read,
 };
 
 use DefectKind::*;
-
-fn bad(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bad").join(name)
-}
-
-fn load(name: &str) -> TriangleMesh {
-    read(bad(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
-}
 
 /// Kinds and numbers of the defects of each readable file. Files without an entry have none.
 const FOUND: &[(&str, &[(DefectKind, usize)])] = &[

@@ -1,13 +1,10 @@
 //! Reads every file of `data/bad`, and variants of each format.
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::support::meshes::bad;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{LoadedMesh, MeshFormat, ReadError, SolidMesh, read, read_bytes};
-
-fn bad(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bad").join(name)
-}
 
 /// Result of reading: numbers of vertices and faces, or words of the error.
 enum Outcome {

@@ -1,23 +1,14 @@
 //! The repair that finds its own options.
-use std::path::{Path, PathBuf};
-
+use crate::support::meshes::load;
 use proptest::prelude::*;
 use tesdf::{
     base::Inside,
     glam::DVec3,
     mesh::{
         RepairMode, RepairOptions, ShellOrientation, SolidMesh, Topology, TriangleMesh, closing_tolerance,
-        read, repair, repair_auto,
+        repair, repair_auto,
     },
 };
-
-fn bad(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bad").join(name)
-}
-
-fn load(name: &str) -> TriangleMesh {
-    read(bad(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
-}
 
 /// The flags that make a mesh encodable; `None` when none do.
 fn flags(mesh: &TriangleMesh) -> Option<String> {

@@ -1,6 +1,7 @@
 //! Places with a negative winding number are found wherever on a face they are, and they count as
 //! outside.
 
+use crate::support::parts::{Parts, Turn};
 use crate::support::random::Random;
 use proptest::prelude::*;
 use tesdf::TeSdf;
@@ -15,34 +16,6 @@ use tesdf::verify::{VerifyOptions, verify};
 /// Faces of a tetrahedron with positive volume, oriented outward.
 const OUTWARD: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
 
-/// A closed mesh made of shells.
-#[derive(Default)]
-struct Shells {
-    vertices: Vec<DVec3>,
-    faces: Vec<[u32; 3]>,
-}
-
-impl Shells {
-    fn add(mut self, vertices: &[DVec3], faces: impl IntoIterator<Item = [u32; 3]>) -> Self {
-        let base = self.vertices.len() as u32;
-        self.vertices.extend(vertices);
-        self.faces.extend(faces.into_iter().map(|f| f.map(|v| v + base)));
-        self
-    }
-
-    fn cube(self, low: DVec3, edge: f64) -> Self {
-        let corners: Vec<DVec3> = (0..8)
-            .map(|k| low + edge * DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)))
-            .collect();
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        self.add(&corners, quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]))
-    }
-
-    fn mesh(self) -> TriangleMesh {
-        TriangleMesh::new(self.vertices, self.faces).expect("vertices and faces of a mesh")
-    }
-}
-
 /// A unit cube containing an inverted tetrahedron whose apex is `height` above the lid of the cube.
 fn pierced(height: f64) -> TriangleMesh {
     let corners = [
@@ -51,8 +24,7 @@ fn pierced(height: f64) -> TriangleMesh {
         DVec3::new(0.7, 0.9, 0.3),
         DVec3::new(0.77, 0.7, 1.0 + height),
     ];
-    let inside_out = OUTWARD.map(|[a, b, c]| [a, c, b]);
-    Shells::default().cube(DVec3::ZERO, 1.0).add(&corners, inside_out).mesh()
+    Parts::default().cube(DVec3::ZERO, 1.0, Turn::Outward).add(&corners, &OUTWARD, Turn::Inward).mesh()
 }
 
 fn negative(report: &CheckReport) -> Vec<(Severity, DVec3)> {
@@ -119,12 +91,13 @@ fn assert_exact(mesh: &TriangleMesh, asset: &TeSdf) {
 fn regions_of_negative_winding_number_are_outside() {
     let folded = {
         // A cube whose lid is a fan around a vertex beyond one side of it, below the lid.
-        let cube = Shells::default().cube(DVec3::ZERO, 1.0);
+        let cube = Parts::default().cube(DVec3::ZERO, 1.0, Turn::Outward);
         let lid = |f: &[u32; 3]| !f.iter().all(|&v| v >= 4);
         let faces: Vec<[u32; 3]> = cube.faces.iter().copied().filter(lid).collect();
         let fan = [[4, 5, 8], [5, 7, 8], [7, 6, 8], [6, 4, 8]];
         let apex = DVec3::new(1.6, 0.5, 0.4);
-        Shells::default().add(&[&cube.vertices[..], &[apex]].concat(), faces.into_iter().chain(fan)).mesh()
+        let faces: Vec<[u32; 3]> = faces.into_iter().chain(fan).collect();
+        Parts::default().add(&[&cube.vertices[..], &[apex]].concat(), &faces, Turn::Outward).mesh()
     };
     for mesh in [pierced(0.4), folded] {
         let solid = SolidMesh::new(mesh.clone()).expect("places that are inside out are a warning");
@@ -139,7 +112,7 @@ fn regions_of_negative_winding_number_are_outside() {
 
 #[test]
 fn a_mesh_that_is_all_inside_out_stays_an_error() {
-    let cube = Shells::default().cube(DVec3::ZERO, 1.0).mesh();
+    let cube = Parts::default().cube(DVec3::ZERO, 1.0, Turn::Outward).mesh();
     let faces = cube.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
     let inverted = TriangleMesh::new(cube.vertices().to_vec(), faces).unwrap();
     let report = check(&inverted);
@@ -155,18 +128,18 @@ fn a_mesh_that_is_all_inside_out_stays_an_error() {
 #[test]
 fn coincident_faces_count_together() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-    let inside_out = OUTWARD.map(|[a, b, c]| [a, c, b]);
-    let twice = Shells::default().add(&corners, OUTWARD.into_iter().chain(OUTWARD)).mesh();
-    assert_eq!(check(&twice).winding, Some([0, 2]));
-    let none = Shells::default().add(&corners, OUTWARD.into_iter().chain(inside_out)).mesh();
-    assert_eq!(check(&none).winding, Some([0, 0]));
-    let minus_one = OUTWARD.into_iter().chain(inside_out).chain(inside_out);
-    assert_eq!(check(&Shells::default().add(&corners, minus_one).mesh()).winding, Some([-1, 0]));
+    let turned = |turns: &[Turn]| {
+        turns.iter().fold(Parts::default(), |parts, &turn| parts.add(&corners, &OUTWARD, turn)).mesh()
+    };
+    assert_eq!(check(&turned(&[Turn::Outward, Turn::Outward])).winding, Some([0, 2]));
+    assert_eq!(check(&turned(&[Turn::Outward, Turn::Inward])).winding, Some([0, 0]));
+    assert_eq!(check(&turned(&[Turn::Outward, Turn::Inward, Turn::Inward])).winding, Some([-1, 0]));
     // A smaller face inside a larger coplanar face.
     let half = corners.map(|p| DVec3::new(0.2, 0.2, 0.0) + 0.5 * p);
-    let within = Shells::default().add(&corners, OUTWARD).add(&half, inside_out).mesh();
+    let tetrahedron = || Parts::default().add(&corners, &OUTWARD, Turn::Outward);
+    let within = tetrahedron().add(&half, &OUTWARD, Turn::Inward).mesh();
     let mirrored = half.map(|p| DVec3::new(p.x, p.y, -p.z));
-    let beside = Shells::default().add(&corners, OUTWARD).add(&mirrored, OUTWARD).mesh();
+    let beside = tetrahedron().add(&mirrored, &OUTWARD, Turn::Outward).mesh();
     assert_eq!(check(&within).winding, Some([0, 1]));
     assert_eq!(check(&beside).winding, Some([-1, 1]));
 }
@@ -196,10 +169,10 @@ proptest! {
         shift in prop::bool::ANY,
     ) {
         let origin = if shift { DVec3::splat(1000.0) } else { DVec3::ZERO };
-        let mut shells = Shells::default();
+        let mut shells = Parts::default();
         for corners in tetrahedra {
             let corners = corners.map(|c| origin + DVec3::new(c[0].into(), c[1].into(), c[2].into()));
-            shells = shells.add(&corners, OUTWARD);
+            shells = shells.add(&corners, &OUTWARD, Turn::Outward);
         }
         let mesh = shells.mesh();
         let report = check(&mesh);

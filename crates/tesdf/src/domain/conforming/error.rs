@@ -6,6 +6,7 @@ use glam::DVec3;
 /// `v` of the vertices of a triangle or a place are those of its vertices. Ids of faces are those
 /// of the surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ConformingError {
     /// A coordinate is outside of the range in which predicates are exact.
     #[error(

@@ -8,6 +8,7 @@ use crate::program::ProgramError;
 
 /// Why Gmsh did not give tetrahedra.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GmshError {
     /// Gmsh cannot be used.
     #[error(transparent)]
@@ -57,6 +58,7 @@ pub struct Refused {
 
 /// Why settings did not give tetrahedra that conform.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RefusedBecause {
     /// Gmsh ended with an error.
     #[error("Gmsh gave no tetrahedra: {0}")]

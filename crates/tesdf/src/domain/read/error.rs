@@ -6,6 +6,7 @@ use crate::mesh::{Place, msh::MshError};
 
 /// Why a file does not give tetrahedra.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadTetrahedraError {
     /// A file cannot be read from disk.
     #[error("cannot read {}: {source}", path.display())]

@@ -44,6 +44,7 @@ impl Default for CadOptions {
 
 /// Why Gmsh gave no triangles of a CAD file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CadError {
     /// Gmsh cannot be used.
     #[error("CAD files are read by Gmsh: {0}; or export STL, 3MF or glTF from the CAD program")]

@@ -1,32 +1,11 @@
-use std::fmt;
 use std::path::{Path, PathBuf};
 
-use super::{CadError, MeshFormat};
+use super::{CadError, MeshFormat, Place};
 use crate::mesh::MeshError;
-
-/// A place in a mesh file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// A line of a text file, 1-based.
-    Line(u64),
-    /// An offset into a binary file, 0-based.
-    Byte(u64),
-    /// An element of a glTF or 3MF file, such as `meshes[0].primitives[1]`.
-    Element(String),
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Line(line) => write!(f, "line {line}"),
-            Self::Byte(byte) => write!(f, "byte {byte}"),
-            Self::Element(element) => f.write_str(element),
-        }
-    }
-}
 
 /// Why a file gives no mesh.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be read from disk.
     #[error("cannot read {}: {source}", path.display())]

@@ -66,6 +66,7 @@ impl Default for ProveOptions {
 
 /// Why a proof cannot begin or was cancelled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProveError {
     /// Mapping a vertex to the local frame rounds it, or the vertex lies too far out.
     #[error(

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use tesdf::mesh::{RepairOptions, SolidMesh, read, repair};
+use tesdf::mesh::{RepairOptions, SolidMesh, TriangleMesh, read, repair};
 
 /// A row of `data/MANIFEST.tsv` for a mesh that can be encoded, as it is or after repair.
 pub struct Row {
@@ -18,6 +18,16 @@ pub const CRACKED: [&str; 2] = ["factory_nut_m4_loose_subdiv_3x", "factory_nut_m
 
 pub fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data")
+}
+
+/// A file of `tests/data/bad`.
+pub fn bad(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bad").join(name)
+}
+
+/// The mesh of a file of `tests/data/bad`.
+pub fn load(name: &str) -> TriangleMesh {
+    read(bad(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
 }
 
 /// All rows except those marked for rejection. A missing file fails when it is read.
