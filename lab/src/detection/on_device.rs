@@ -172,7 +172,7 @@ fn measure(
             sent: bytes(|r| r.sent),
             read: bytes(|r| r.read),
             shapes_table: held.shapes.table,
-            shapes_words: held.shapes.words,
+            shapes_words: held.shapes.words + held.shapes.fans,
             shapes_rows: held.shapes.rows,
             products: held.pipeline.iter().map(|(_, bytes)| bytes).sum(),
             total: held.with_instances(frames.scene.instances().len()),

@@ -24,8 +24,8 @@ pub struct Counts {
     pub candidates: u32,
     /// Evaluations of the field by the modes face and exact; 0 without
     /// [`Counting::Operations`](crate::Counting::Operations). In the mode face a group of 32
-    /// threads makes an evaluation, of up to eight points at once. In the mode exact, and for the
-    /// extremes of a whole face, a thread makes an evaluation, of one point.
+    /// threads makes an evaluation, of up to eight points at once. In the mode exact a thread makes
+    /// an evaluation, of one point.
     pub evaluations: u32,
     /// Distances of points and faces in these evaluations and, in the mode exact, of polygons and
     /// faces; 0 without [`Counting::Operations`](crate::Counting::Operations).

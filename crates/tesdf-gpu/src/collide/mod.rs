@@ -18,13 +18,13 @@ pub mod scene;
 mod shared;
 mod stages;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tesdf::Length;
 use tesdf::collide::internal::in_cones;
 use tesdf::collide::{
     CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, InstancePair, Reduction, Scene,
-    Shape, ShapeId, Statistics, reduce_pairs,
+    Shape, ShapeId, Statistics, detect_pairs, reduce_pairs,
 };
 
 use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
@@ -32,7 +32,7 @@ use contacts::{Row, Words, contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
 pub use device_contacts::DeviceContacts;
 pub use given_poses::GivenPoses;
-use on_processor::{Divided, with_pairs};
+use on_processor::{finds_all, is_detected, pairs_on_processor, with_pairs};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
@@ -62,10 +62,6 @@ pub struct Detector {
     report: DeviceReport,
 }
 
-/// The smallest tolerance of the exact mode, in the frame of a field: a few times the rounding
-/// error of distances in `f32`.
-const FINEST: f64 = 1e-6;
-
 impl Detector {
     /// Creates a detector and uploads the shapes of a scene. When a later scene has other shapes,
     /// [`detect`](Self::detect) uploads these.
@@ -94,12 +90,10 @@ impl Detector {
     /// # Errors
     /// The errors of [`new`](Self::new).
     pub fn upload(&mut self, scene: &Scene) -> Result<(), GpuError> {
-        self.upload_shapes(&Divided::new(scene)?.on_device)
+        self.upload_shapes(scene, shape_ids(scene))
     }
 
-    /// Uploads the shapes of a scene whose contacts kernels find.
-    fn upload_shapes(&mut self, scene: &Scene) -> Result<(), GpuError> {
-        let ids = shape_ids(scene);
+    fn upload_shapes(&mut self, scene: &Scene, ids: Vec<ShapeId>) -> Result<(), GpuError> {
         let shapes: Vec<Shape> = ids.iter().map(|&id| scene.shape(id).cloned()).collect::<Result<_, _>>()?;
         self.shapes = GpuShapes::upload(&self.device, &shapes)?;
         self.frames = shapes.iter().map(FieldFrame::new).collect();
@@ -135,7 +129,9 @@ impl Detector {
     ///   This saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
     /// - Kernels do not detect open meshes under the rule
     ///   [`Generalized`](tesdf::base::InsideRule::Generalized), nor meshes with faces that look
-    ///   inwards in places. The processor finds all contacts of their instances, in `f64`.
+    ///   inwards in places. The processor finds all contacts of their instances, in `f64`. With
+    ///   contacts per face or per minimum in the mode [`Face`](tesdf::collide::Mode::Face) it finds
+    ///   those of all instances, as [`tesdf::collide::detect`].
     ///   [`DeviceReport::pairs_on_processor`] counts these pairs.
     /// - The same input gives the same bytes on the same device.
     ///
@@ -183,30 +179,35 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         let options = &possible(options)?;
-        let (divided, pairs) = self.divide(scene, options)?;
-        let found = self.run_on_device(&divided.on_device, options, timing)?;
+        let pairs = self.pairs_on_processor(scene, options)?;
+        if finds_all(options) {
+            self.report = DeviceReport { pairs_on_processor: pairs.len(), ..DeviceReport::default() };
+            return Ok(detect_pairs(&pairs, scene, options)?);
+        }
+        let found = self.run_on_device(scene, options, timing)?;
         self.report.pairs_on_processor = pairs.len();
         Ok(with_pairs(found, &pairs, scene, options)?)
     }
 
-    /// Divides the instances of a scene by where contacts are found, and returns the pairs that the
-    /// processor detects.
-    fn divide<'a>(
+    /// The pairs of instances that the processor detects.
+    fn pairs_on_processor(
         &self,
-        scene: &'a Scene,
+        scene: &Scene,
         options: &CollideOptions,
-    ) -> Result<(Divided<'a>, Vec<InstancePair>), GpuError> {
-        let divided = Divided::new(scene)?;
-        let pairs = divided.pairs(scene, options)?;
-        if !pairs.is_empty() && self.shapes.have_moved() {
+    ) -> Result<Vec<InstancePair>, GpuError> {
+        let pairs = pairs_on_processor(scene, options)?;
+        let all = finds_all(options);
+        if self.shapes.have_moved() && (all || !pairs.is_empty()) {
+            let what = match all {
+                true => "contacts per face or minimum in the mode `face`",
+                false => "contacts of open meshes and of faces with the inside in front of them",
+            };
             return Err(GpuError::Unavailable {
-                what: "contacts of open meshes and of faces with the inside in front of them, while vertices have moved on \
-                       the device"
-                    .into(),
+                what: format!("{what}, while vertices have moved on the device"),
                 instead: "move the vertices of the scene, and upload it",
             });
         }
-        Ok((divided, pairs))
+        Ok(pairs)
     }
 
     fn run_on_device(
@@ -254,14 +255,15 @@ impl Detector {
         normals: Normals,
         timing: Timing,
     ) -> Result<(Instances, Buffer), GpuError> {
-        if shape_ids(scene) != self.shape_ids {
+        let shape_ids = shape_ids(scene);
+        if shape_ids != self.shape_ids {
             if self.shapes.have_moved() {
                 return Err(GpuError::Unavailable {
                     what: "a scene with other shapes than those that have moved".into(),
                     instead: "upload the scene, and move its vertices again",
                 });
             }
-            self.upload_shapes(scene)?;
+            self.upload_shapes(scene, shape_ids)?;
         }
         // The processor's tree knows neither vertices nor instances that have moved on the device.
         let on_processor = !self.shapes.have_moved() && given.is_none();
@@ -312,12 +314,12 @@ impl Detector {
         Ok(true)
     }
 
-    /// The tolerance for each instance, in the frame of its field. It is at least `least`.
-    fn tolerances(&self, instances: &Instances, tolerance: Length, least: f64) -> Vec<f32> {
+    /// The tolerance for each instance, in the frame of its field.
+    fn tolerances(&self, instances: &Instances, tolerance: Length) -> Vec<f32> {
         let in_field = |(at, &shape): (&Placed, &usize)| {
             let scale = at.unit / self.frames[shape].unit();
             let diagonal = self.diagonals[shape].min(f64::MAX) * scale;
-            (tolerance.resolve(diagonal) / at.unit).max(least) as f32
+            (tolerance.resolve(diagonal) / at.unit) as f32
         };
         instances.placed.iter().zip(&instances.shapes).map(in_field).collect()
     }
@@ -413,11 +415,11 @@ impl Detector {
     }
 }
 
-/// Validates options. On a device, spread contacts are those of a reduction.
+/// Validates options. Kernels spread contacts by a reduction.
 fn possible(options: &CollideOptions) -> Result<CollideOptions, GpuError> {
     options.validate()?;
     let reduction = match options.reduction {
-        Reduction::Spread(n) => Reduction::PerPair(n),
+        Reduction::Spread(n) if !finds_all(options) => Reduction::PerPair(n),
         reduction => reduction,
     };
     Ok(CollideOptions { reduction, ..*options })
@@ -428,13 +430,8 @@ fn wants_minima(options: &CollideOptions) -> bool {
     options.mode.contacts_per() == Some(ContactsPer::Minimum)
 }
 
-/// The shapes of all instances, sorted and without duplicates.
+/// The shapes of all instances whose contacts kernels find, sorted and without duplicates.
 fn shape_ids(scene: &Scene) -> Vec<ShapeId> {
-    let mut ids = Vec::new();
-    for (_, instance) in scene.instances() {
-        if let Err(at) = ids.binary_search(&instance.shape) {
-            ids.insert(at, instance.shape);
-        }
-    }
-    ids
+    let ids: BTreeSet<ShapeId> = scene.instances().map(|(_, instance)| instance.shape).collect();
+    ids.into_iter().filter(|&id| scene.shape(id).is_ok_and(is_detected)).collect()
 }

@@ -3,7 +3,7 @@ use tesdf::collide::{FaceOptions, Mode};
 
 use super::pass::{GROUP, Parts, Pass, parts};
 use super::stages::launch;
-use super::{Counting, Exchange, FINEST, Lanes};
+use super::{Counting, Exchange, Lanes};
 use crate::GpuError;
 use crate::device::Buffer;
 use crate::kernels::counters::{CONTACTS, POLYGONS};
@@ -11,7 +11,7 @@ use crate::kernels::narrow::cones::contact;
 use crate::kernels::narrow::exact::AskedExactLaunch;
 use crate::kernels::narrow::exchange::{LANES, Variant};
 use crate::kernels::narrow::faces::AskedLaunch;
-use crate::kernels::narrow::{exact, exact_faces, faces, nodes, whole_faces};
+use crate::kernels::narrow::{exact, exact_faces, faces, nodes};
 
 impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
@@ -25,15 +25,16 @@ impl Pass<'_> {
     /// Gives contacts of faces the normals that both bodies allow.
     pub(super) fn in_cones(&mut self) -> Result<(), GpuError> {
         let per_contact = self.groups_for(self.detector.buffers.room.contacts, GROUP, CONTACTS)?;
-        let tolerances = self.tolerances(0.0)?;
+        let tolerances = self.tolerances()?;
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
+        let fans = shapes.fans();
         launch!(
             self.stages,
             "normals",
             per_contact,
             GROUP,
-            contact::in_cones(shapes.argument(), pairs, tolerances.words(), counters, contacts)
+            contact::in_cones(shapes.argument(), fans, pairs, tolerances.words(), counters, contacts)
         )
     }
 
@@ -61,49 +62,31 @@ impl Pass<'_> {
         self.face_options().cos_theta.map_or(-2.0, |cos| cos as f32)
     }
 
-    /// The tolerances of all instances on the device, at least `least`.
-    fn tolerances(&mut self, least: f64) -> Result<Buffer, GpuError> {
-        let tolerances = self.detector.tolerances(self.instances, self.face_options().tolerance, least);
+    /// The tolerances of all instances on the device, which are uploaded once for a pass.
+    fn tolerances(&mut self) -> Result<Buffer, GpuError> {
+        if let Some(uploaded) = &self.tolerances {
+            return Ok(uploaded.clone());
+        }
+        let tolerances = self.detector.tolerances(self.instances, self.face_options().tolerance);
         let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
         self.sent += tolerances.bytes();
-        Ok(tolerances)
+        Ok(self.tolerances.insert(tolerances).clone())
     }
 
     fn narrow_faces(&mut self, iterations: u32) -> Result<(), GpuError> {
         let (shapes, buffers, with) = (&self.detector.shapes, &self.detector.buffers, &self.detector.options);
-        let whole = parts(self.options) == Parts::Faces;
         let (per, lanes) = match with.lanes {
-            Lanes::Single if !whole => (LANES, 1),
-            _ => (1, LANES),
+            Lanes::Single => (LANES, 1),
+            Lanes::Group => (1, LANES),
         };
         let variant = Variant {
             lanes,
             subgroups: with.exchange == Exchange::Device && self.detector.device.has_subgroups_of_32(),
             counting: with.counting == Counting::Operations,
-            whole,
         };
         let per_polygon = self.groups_for(buffers.room.polygons, per, POLYGONS)?;
-        let tolerances = self.tolerances(FINEST)?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
-        let asked = AskedLaunch::new(tolerances.words(), iterations, self.cos_theta());
-        if whole {
-            let faces = buffers.whole_faces();
-            return launch!(
-                self.stages,
-                "face narrow phase",
-                per_polygon,
-                LANES,
-                whole_faces::narrow_whole_faces(
-                    shapes.argument(),
-                    pairs,
-                    faces,
-                    counters,
-                    contacts,
-                    asked,
-                    variant
-                )
-            );
-        }
+        let asked = AskedLaunch::new(iterations, self.cos_theta());
         let polygons = buffers.polygons();
         launch!(
             self.stages,
@@ -117,7 +100,7 @@ impl Pass<'_> {
     fn narrow_exact(&mut self) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let per_polygon = self.groups_for(buffers.room.polygons, 1, POLYGONS)?;
-        let tolerances = self.tolerances(FINEST)?;
+        let tolerances = self.tolerances()?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
         let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
         let counting = self.detector.options.counting == Counting::Operations;

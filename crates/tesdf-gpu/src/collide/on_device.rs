@@ -6,12 +6,12 @@ use tesdf::collide::{CollideError, CollideOptions, HiddenOverlap, InstanceId, Re
 use super::contacts::contacts;
 use super::device_contacts::DeviceContacts;
 use super::given_poses::GivenPoses;
-use super::on_processor::{has_undetected, with_pairs_on_device};
+use super::on_processor::{finds_all, has_undetected, with_pairs_on_device};
 use super::pass::{GROUP, Normals, Parts, Pass, parts};
 use super::scene::instances::Instances;
 use super::scene::placed::Placed;
 use super::stages::{Stages, Timing, launch};
-use super::{Detector, possible, wants_minima};
+use super::{Detector, DeviceReport, possible, wants_minima};
 use crate::GpuError;
 use crate::device::{Buffer, spread};
 use crate::kernels::broad::place::{self, GivenLaunch};
@@ -68,8 +68,8 @@ impl Detector {
     /// poses, the instances of the scene are there instead of at their own poses. Only counters are
     /// read back. The arrays are complete when the call returns, so every stream may read them.
     ///
-    /// Where a scene has shapes whose contacts the processor finds (see [`detect`](Self::detect)),
-    /// poses and contacts are copied to it and back.
+    /// Where the processor finds contacts (see [`detect`](Self::detect)), poses and contacts are
+    /// copied to it and back.
     ///
     /// Everything is rounded to `f32`, points and poses of the world too. The same input gives the
     /// same bytes on the same device.
@@ -78,9 +78,9 @@ impl Detector {
     /// The errors of [`detect`](Self::detect), and
     /// - [`GpuError::Length`] when an array does not have a row for each instance;
     /// - [`GpuError::Instance`] for a pose that is none, or a velocity that is not finite;
-    /// - [`GpuError::Unavailable`] for what only the processor does: contacts per minimum, and
-    ///   one contact of all faces at a vertex. So contacts per face, which are the default, must be
-    ///   reduced.
+    /// - [`GpuError::Unavailable`] for what only the processor does with contacts of kernels:
+    ///   contacts per minimum, and one contact of all faces at a vertex. So contacts per face, which
+    ///   are the default, must be reduced.
     pub fn detect_on_device(
         &mut self,
         scene: &Scene,
@@ -89,7 +89,9 @@ impl Detector {
     ) -> Result<DeviceContacts, GpuError> {
         let options = &possible(options)?;
         let reduces = matches!(options.reduction, Reduction::PerPair(_));
-        let of_processor = if wants_minima(options) {
+        let of_processor = if finds_all(options) {
+            None
+        } else if wants_minima(options) {
             Some(("contacts per minimum", "ask for contacts per cell, or reduced contacts per face"))
         } else if parts(options) == Parts::Faces && !reduces {
             Some((
@@ -108,19 +110,24 @@ impl Detector {
         let placed;
         let (scene, given) = match given {
             // The processor needs them.
-            Some(given) if has_undetected(scene) => {
+            Some(given) if has_undetected(scene) || finds_all(options) => {
                 placed = given.placed(&self.device, scene)?;
                 (&placed, None)
             }
             given => (scene, given),
         };
-        let (divided, pairs) = self.divide(scene, options)?;
-        let found = self.leave(&divided.on_device, given, options)?;
+        let pairs = self.pairs_on_processor(scene, options)?;
+        let found = if finds_all(options) {
+            self.report = DeviceReport::default();
+            DeviceContacts::empty(&self.device, 0)?
+        } else {
+            self.leave(scene, given, options)?
+        };
         self.report.pairs_on_processor = pairs.len();
         with_pairs_on_device(found, &pairs, scene, options, &self.device)
     }
 
-    /// Finds the contacts of a scene without instances that only the processor detects.
+    /// Finds the contacts between instances whose shapes kernels detect.
     fn leave(
         &mut self,
         scene: &Scene,

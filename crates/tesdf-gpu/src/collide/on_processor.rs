@@ -1,60 +1,45 @@
-//! Instances whose contacts kernels do not find. The processor does.
-use std::borrow::Cow;
-
+//! Pairs of instances whose contacts kernels do not find. The processor does.
 use tesdf::collide::{
     CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, InstancePair, InstancePairs,
-    Scene, Shape, detect_pairs,
+    Mode, Scene, Shape, detect_pairs,
 };
 
 use super::device_contacts::DeviceContacts;
+use super::pass::{Parts, parts};
 use crate::GpuError;
 use crate::device::{Device, DeviceArray, Word};
 
-/// A scene by where contacts are found.
-pub struct Divided<'a> {
-    /// The scene without the instances of [`on_processor`](Self::on_processor).
-    pub on_device: Cow<'a, Scene>,
-    /// The instances that kernels do not detect, in the order of ids. The processor finds all their
-    /// contacts.
-    pub on_processor: Vec<InstanceId>,
+/// Whether the processor finds all contacts: Frank–Wolfe over whole faces has no kernel.
+pub fn finds_all(options: &CollideOptions) -> bool {
+    matches!(options.mode, Mode::Face { .. }) && parts(options) == Parts::Faces
 }
 
-impl<'a> Divided<'a> {
-    /// Divides the instances of a scene by their shapes.
-    pub fn new(scene: &'a Scene) -> Result<Self, CollideError> {
-        if !has_undetected(scene) {
-            return Ok(Self { on_device: Cow::Borrowed(scene), on_processor: Vec::new() });
-        }
-        let mut on_processor = Vec::new();
-        for (id, instance) in scene.instances() {
-            if is_undetected(scene.shape(instance.shape)?) {
-                on_processor.push(id);
-            }
-        }
-        let mut on_device = scene.clone();
-        on_device.remove(&on_processor)?;
-        Ok(Self { on_device: Cow::Owned(on_device), on_processor })
+/// The pairs of instances that the processor detects: all, or those of the shapes that kernels do
+/// not detect.
+pub fn pairs_on_processor(
+    scene: &Scene,
+    options: &CollideOptions,
+) -> Result<Vec<InstancePair>, CollideError> {
+    let all = finds_all(options);
+    if !all && !has_undetected(scene) {
+        return Ok(Vec::new());
     }
-
-    /// The pairs of instances that the processor detects.
-    pub fn pairs(&self, scene: &Scene, options: &CollideOptions) -> Result<Vec<InstancePair>, CollideError> {
-        if self.on_processor.is_empty() {
-            return Ok(Vec::new());
-        }
-        let mut pairs = InstancePairs::new();
-        pairs.update(scene, options)?;
-        let has = |id: &InstanceId| self.on_processor.binary_search(id).is_ok();
-        Ok(pairs.pairs().iter().filter(|pair| has(&pair.first) || has(&pair.second)).copied().collect())
-    }
+    let mut pairs = InstancePairs::new();
+    pairs.update(scene, options)?;
+    let of_shape = |id| scene.instance(id).and_then(|instance| scene.shape(instance.shape));
+    let has = |id| of_shape(id).is_ok_and(|shape| !is_detected(shape));
+    let kept = pairs.pairs().iter().filter(|pair| all || has(pair.first) || has(pair.second));
+    Ok(kept.copied().collect())
 }
 
 /// Whether a scene has shapes whose contacts kernels do not find.
 pub fn has_undetected(scene: &Scene) -> bool {
-    scene.shapes().any(|(_, shape)| is_undetected(shape))
+    scene.shapes().any(|(_, shape)| !is_detected(shape))
 }
 
-fn is_undetected(shape: &Shape) -> bool {
-    matches!(shape, Shape::Mesh(asset) if !asset.is_detected_on_devices())
+/// Whether kernels find the contacts of a shape.
+pub fn is_detected(shape: &Shape) -> bool {
+    !matches!(shape, Shape::Mesh(asset) if !asset.is_detected_on_devices())
 }
 
 /// The place of the contacts of two instances in the order of all.

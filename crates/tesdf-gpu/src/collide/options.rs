@@ -52,7 +52,7 @@ pub enum Lanes {
     /// 32 threads, which share the faces of the cell's list.
     #[default]
     Group,
-    /// One thread, for comparison (Fig. 4 of the paper). Used by Face-TES with contacts per cell.
+    /// One thread, for comparison (Fig. 4 of the paper). Used by Face-TES.
     Single,
 }
 
@@ -84,8 +84,8 @@ pub enum Counting {
     #[default]
     Elements,
     /// Evaluations of the field and distances to faces in the narrow phase of the modes face and
-    /// exact. The mode face pays two atomic additions per polygon. The mode exact and whole faces
-    /// pay two per thread, and search once more for each evaluation.
+    /// exact. The mode face pays two atomic additions per polygon. The mode exact pays two per
+    /// thread, and searches once more for each evaluation.
     Operations,
 }
 
@@ -138,7 +138,7 @@ pub struct DeviceReport {
     /// Bytes that were read from the device, in all passes.
     pub read: usize,
     /// Number of pairs of instances whose contacts the processor has found, because kernels do not
-    /// detect a shape.
+    /// detect a shape, or not with these options.
     pub pairs_on_processor: usize,
     /// Counts of the last pass.
     pub counts: Counts,
@@ -161,8 +161,8 @@ pub struct DeviceBytes {
 impl DeviceBytes {
     /// The total, with the memory of `instances` instances.
     pub fn with_instances(&self, instances: usize) -> usize {
-        let ShapeBytes { table, words, rows } = self.shapes;
+        let ShapeBytes { table, words, rows, fans } = self.shapes;
         let pipeline: usize = self.pipeline.iter().map(|(_, bytes)| bytes).sum();
-        table + words + rows + pipeline + instances * self.per_instance
+        table + words + rows + fans + pipeline + instances * self.per_instance
     }
 }

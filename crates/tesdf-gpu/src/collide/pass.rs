@@ -55,6 +55,8 @@ pub struct Pass<'a> {
     pub stages: Stages<'a>,
     /// Poses and motions of the instances.
     pub placed: Buffer,
+    /// Tolerances of the instances, once a stage has needed them.
+    pub tolerances: Option<Buffer>,
     /// Bytes that were sent to the device.
     pub sent: usize,
 }
@@ -74,6 +76,9 @@ impl Detector {
         if parts(options) == Parts::Polygons {
             self.buffers.add_weights(&device)?;
         }
+        if normals == Normals::InCones {
+            self.shapes.add_fans()?;
+        }
         let counters = device.upload("counters", &[0u32; COUNTERS])?;
         let placed = match given {
             None => device.upload("instances", &instances.rows)?,
@@ -86,6 +91,7 @@ impl Detector {
             sent: counters.bytes() + if given.is_some() { 0 } else { placed.bytes() },
             counters: counters.clone(),
             placed: placed.clone(),
+            tolerances: None,
             stages: Stages::new(&device, timing),
         };
         if let Some(given) = given {

@@ -18,7 +18,7 @@ use super::counters::{self, CountersLaunch};
 use super::deform::bounds::MovingLaunch;
 use super::encode::sample::SamplesLaunch;
 use super::field::query;
-use super::field::shapes::{Rules, ShapesLaunch};
+use super::field::shapes::{FansLaunch, Rules, ShapesLaunch};
 use super::middle::items::{ItemsLaunch, PolygonsLaunch};
 use super::narrow::contacts::ContactsLaunch;
 use super::narrow::exact::AskedExactLaunch;
@@ -135,14 +135,15 @@ fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
 /// Adds the kernels of the narrow phase.
 fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let exact = || AskedExactLaunch::new(words(), 0.0);
+    let fans = || FansLaunch::new(words());
     let at_points = Rules { at_points: true, ..Rules::default() };
-    let asked = || AskedLaunch::new(words(), 1, 0.0);
+    let asked = || AskedLaunch::new(1, 0.0);
     let in_world = || WorldContactsLaunch::new(words(), words(), words(), words(), words());
     kernels!(all, device, target;
         Direct narrow::sorted::begin, GROUP, (words(), 1);;
         Direct narrow::sorted::merge, GROUP, (contacts(), words(), words(), 1, 1);;
         Direct narrow::world::to_world, GROUP, (contacts(), words(), rows(), words(), in_world(), 1);;
-        Indirect narrow::cones::contact::in_cones, GROUP, (shapes(), pairs(), words(), counters(), contacts());;
+        Indirect narrow::cones::contact::in_cones, GROUP, (shapes(), fans(), pairs(), words(), counters(), contacts());;
         Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), false);;
@@ -158,7 +159,7 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     for counting in [false, true] {
         for lanes in [LANES, 1] {
             for subgroups in [true, false] {
-                let variant = Variant { lanes, subgroups, counting, whole: false };
+                let variant = Variant { lanes, subgroups, counting };
                 let exchange = if subgroups { "subgroups" } else { "shared memory" };
                 let counting = if counting { ", counting" } else { "" };
                 kernels!(all, device, target;
@@ -166,14 +167,6 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
                         (shapes(), pairs(), polygons(), counters(), contacts(), asked(), variant);
                         format!("{lanes} lanes, {exchange}{counting}");;
                 );
-                if lanes == LANES {
-                    let variant = Variant { whole: true, ..variant };
-                    kernels!(all, device, target;
-                        Indirect narrow::whole_faces::narrow_whole_faces, LANES,
-                            (shapes(), pairs(), polygons(), counters(), contacts(), asked(), variant);
-                            format!("{exchange}{counting}");;
-                    );
-                }
             }
         }
     }

@@ -265,6 +265,28 @@ fn groups_and_exclusions() {
     assert_eq!(count(&scene), 0);
 }
 
+/// Two instances that are marked as still are no pair, whichever side finds the pairs.
+#[test]
+fn still_instances_meet_only_moving_ones() {
+    let mut scene = Scene::new();
+    let block = scene.add_shape(Shape::Box { half_extents: DVec3::splat(0.5) }).expect("a shape");
+    let at = |k: u32| Instance::new(block, Pose::at(0.9 * f64::from(k) * DVec3::X));
+    let ids: Vec<InstanceId> = (0..4).map(|k| scene.add(at(k)).expect("an instance")).collect();
+    let options = CollideOptions::with_mode(Mode::Node);
+    for still in [vec![], vec![0, 1], vec![0, 1, 2, 3], vec![1, 3], vec![1, 2, 3]] {
+        scene.set_still(still.iter().map(|&k: &usize| ids[k]));
+        let pairs = instance_pairs(&scene, options.contact_distance, 0.0).expect("pairs").len();
+        for max_pair_tests in [DetectorOptions::default().max_pair_tests, 0] {
+            let with = DetectorOptions { max_pair_tests, ..DetectorOptions::default() };
+            let (contacts, detector) = found(&scene, &options, with);
+            let counts = detector.report().counts;
+            assert_eq!(counts.ordered_pairs as usize, 2 * pairs, "{still:?} are still");
+            let expected = detect(&scene, &options).expect("detects");
+            assert_eq!(contacts.len(), expected.len(), "{still:?} are still");
+        }
+    }
+}
+
 #[test]
 fn buffers_grow_or_say_what_they_need() {
     let mut random = Random(4);

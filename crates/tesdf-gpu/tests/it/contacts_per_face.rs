@@ -1,11 +1,14 @@
 //! Contacts per face on the device: what holds on the processor holds here, within `f32`.
 
-use crate::compare::{ROUNDING, found};
+use crate::compare::{ROUNDING, device, found};
+use crate::on_device::{are_equal, read, worlds};
 use crate::support::bodies::{Placed, RELATIONS, Relation, scene};
 use crate::support::per_face::{Detection, Kept};
 use crate::support::random::Random;
-use tesdf::collide::{CollideOptions, Contacts, ContactsPer, Mode, Placement, Pose, Scene};
-use tesdf_gpu::{Counting, DetectorOptions};
+use tesdf::collide::{
+    CollideOptions, Contacts, ContactsPer, Mode, Placement, Pose, Reduction, Scene, detect,
+};
+use tesdf_gpu::{Counting, Detector, DetectorOptions, DeviceArray, GivenPoses};
 
 fn on_device(scene: &Scene, options: &CollideOptions) -> Contacts {
     found(scene, options, DetectorOptions::default()).0
@@ -56,13 +59,11 @@ fn minima_are_followed_by_no_lower_point() {
         for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
             let bodies = relation.place(names, &mut random);
             let contact_distance = 1e-3 * bodies[0].diagonal();
-            for mode in [Mode::exact(), Mode::face()] {
-                let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, mode);
-                all = [all[0] + counts[0], all[1] + counts[1]];
-            }
+            let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, Mode::exact());
+            all = [all[0] + counts[0], all[1] + counts[1]];
         }
     }
-    assert!(all[0] > 500 && all[1] > 500, "{all:?}");
+    assert!(all[0] > 250 && all[1] > 250, "{all:?}");
 }
 
 #[test]
@@ -91,7 +92,41 @@ fn a_box_stands_on_a_plane_and_on_four_pegs() {
 
 #[test]
 fn a_vertex_of_several_faces_has_one_contact() {
-    DEVICE.vertex_of_several_faces_has_one_contact(&[Mode::exact(), Mode::face()]);
+    DEVICE.vertex_of_several_faces_has_one_contact(&[Mode::exact()]);
+}
+
+/// Frank–Wolfe over whole faces has no kernel: the processor finds the same contacts as without a
+/// device, also of poses on it, and they are left there.
+#[test]
+fn the_processor_steps_over_whole_faces() {
+    let scene = worlds(2, &mut Random(31));
+    let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("fits");
+    let device = detector.device().clone();
+    let of_instance = |pose: Pose| {
+        [&pose.translation.as_vec3().to_array()[..], &pose.rotation.as_quat().to_array()].concat()
+    };
+    let poses: Vec<f32> = scene.instances().flat_map(|(_, instance)| of_instance(instance.pose)).collect();
+    let poses = DeviceArray::upload(&device, &poses).expect("fits");
+    let given = GivenPoses { poses: &poses, velocities: None };
+    for contacts_per in [ContactsPer::Face, ContactsPer::Minimum] {
+        for reduction in [Reduction::None, Reduction::PerPair(3), Reduction::Spread(3)] {
+            let options = CollideOptions {
+                contact_distance: 0.01,
+                reduction,
+                ..CollideOptions::with_mode(Mode::face().per(contacts_per))
+            };
+            let expected = detect(&scene, &options).expect("detects");
+            let contacts = detector.detect(&scene, &options).expect("detects");
+            assert!(!expected.is_empty() && contacts.as_slice() == expected.as_slice(), "{options:?}");
+            let report = detector.report();
+            assert!(report.launches == 0 && report.pairs_on_processor >= 4, "{report:?}");
+            for given in [None, Some(&given)] {
+                let staying = detector.detect_on_device(&scene, given, &options).expect("detects");
+                are_equal(&read(&device, &staying), expected.as_slice(), 2.0, 1e-5);
+                assert_eq!(detector.report().launches, 0);
+            }
+        }
+    }
 }
 
 /// A query of the mode `exact` looks at one point at least.

@@ -1,8 +1,8 @@
 //! Normals of contacts are in the normal cones of both bodies: of contacts that are read from the
 //! device, and of those that stay there.
-use crate::compare::{ROUNDING, device, found};
+use crate::compare::{ROUNDING, device, found, per_cell};
 use crate::degenerate::{encoded, solids};
-use crate::on_device::{are_equal, detector, read, staying};
+use crate::on_device::{self, are_equal, detector, read, staying};
 use crate::support::blocks::{
     Known, edges_are_pushed_along_the_normal_of_the_floor, normals_are_in_the_cones_where_these_meet,
     touching,
@@ -13,6 +13,21 @@ use crate::support::random::Random;
 use tesdf::collide::{CollideOptions, Contact, ContactsPer, Instance, Mode, Placement, Pose, Scene, Shape};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_gpu::DetectorOptions;
+
+/// The faces of vertices are uploaded for the first contacts of faces that stay on the device.
+#[test]
+fn faces_of_vertices_are_uploaded_when_they_are_needed() {
+    let scene = on_device::worlds(1, &mut Random(12));
+    let mut detector = detector(&scene);
+    let of = |mode| CollideOptions { contact_distance: 0.01, ..per_cell(mode) };
+    detector.detect(&scene, &of(Mode::Exact)).expect("detects");
+    detector.detect_on_device(&scene, None, &of(Mode::Node)).expect("detects");
+    let before = detector.bytes();
+    assert_eq!(before.shapes.fans, 0);
+    detector.detect_on_device(&scene, None, &of(Mode::Exact)).expect("detects");
+    let after = detector.bytes();
+    assert!(after.shapes.fans > 0 && after.with_instances(3) == before.with_instances(3) + after.shapes.fans);
+}
 
 /// From the rounding of `f32` on.
 const GAPS: [f64; 7] = [0.0, 1e-6, -1e-6, 1e-5, -1e-5, 5e-5, -5e-5];

@@ -11,7 +11,9 @@ fn every_kernel_compiles_to_machine_code() {
     for source in SOURCES.iter() {
         let compiled = compile(source, "sm_90a").unwrap_or_else(|e| panic!("{e}"));
         assert!(compiled.image.starts_with(b"\x7fELF"), "{}", source.kernel);
-        let Resources { registers, .. } = compiled.resources.expect("machine code has it");
+        let resources = compiled.resources.expect("machine code has it");
+        println!("{}: {resources}", source.kernel);
+        let Resources { registers, .. } = resources;
         assert!((1..=255).contains(&registers), "{}: {registers} registers", source.kernel);
     }
 }

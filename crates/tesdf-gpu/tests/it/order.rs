@@ -12,7 +12,7 @@ use tesdf::collide::{CollideOptions, Contacts, Mode, Reduction};
 fn forms() -> Vec<CollideOptions> {
     let of = |mode| CollideOptions { contact_distance: 0.01, ..per_cell(mode) };
     let more = [
-        CollideOptions { mode: Mode::face(), ..of(Mode::face()) },
+        of(Mode::exact().per(ContactsPer::Face)),
         of(Mode::face().filtered(0.3)),
         CollideOptions { reduction: Reduction::PerPair(3), ..of(Mode::exact()) },
     ];

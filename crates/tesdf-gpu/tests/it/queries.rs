@@ -3,8 +3,8 @@
 use crate::support::bodies::{body, rotation};
 use crate::support::random::Random;
 use tesdf::collide::{Placement, Pose, Shape};
-use tesdf::glam::DVec3;
-use tesdf_gpu::{Device, GpuShapeId, GpuShapes};
+use tesdf::glam::{DVec3, Vec3};
+use tesdf_gpu::{Device, DeviceAnswers, DeviceArray, GpuShapeId, GpuShapes};
 
 /// Largest error of a distance, relative to the diagonal: twice the documented error of the host's
 /// `f32` queries.
@@ -116,6 +116,50 @@ fn points_times_instances() {
             let ahead = answer.closest_point + answer.signed_distance * answer.gradient;
             assert!(ahead.distance(*p) < 1e-5, "shape {shape}: {ahead} instead of {p}");
         }
+    }
+}
+
+/// Points as far out as there are numbers have the answers of the processor, and finite ones in `f32`.
+#[test]
+fn points_far_out_are_answered() {
+    let device = Device::choose(None).expect("a device");
+    let mesh = body("l_bracket").asset.clone();
+    let block = Shape::Box { half_extents: DVec3::new(0.1, 0.2, 0.3) };
+    let shapes = [Shape::Mesh(mesh), block, Shape::Sphere { radius: 0.5 }, Shape::Plane];
+    let uploaded = GpuShapes::upload(&device, &shapes).expect("fits");
+    let at = Placement { pose: Pose::at(DVec3::new(3.0, -1.0, 2.0)), scale: 1e-3 };
+    let instances: Vec<(GpuShapeId, Placement)> = uploaded.ids().into_iter().map(|id| (id, at)).collect();
+    let ways = [DVec3::new(1.0, 0.0, 0.0), DVec3::new(-1.0, 0.5, 1.0), DVec3::new(0.3, -1.0, -0.7)];
+    let largest = f64::from(f32::MAX);
+    let sizes = [1e5, 1e10, 1e16, 1e20, 1e37, largest];
+    let points: Vec<DVec3> = sizes.iter().flat_map(|size| ways.map(|way| *size * way)).collect();
+    let expected = |shape: &Shape, p: DVec3| at.scale * crate::compare::exact(shape, at.to_shape(p));
+    // Lengths beyond 1e150 have no squares.
+    let farther: Vec<DVec3> = ways.iter().map(|way| 1e140 * *way).chain(points.clone()).collect();
+    let answers = uploaded.signed_distances(&farther, &instances).expect("answers");
+    for (shape, answers) in shapes.iter().zip(&answers) {
+        for (p, answer) in farther.iter().zip(answers) {
+            let (found, expected) = (answer.signed_distance, expected(shape, *p));
+            // A plane cancels what is along it.
+            assert!((found - expected).abs() < 2e-6 * p.length(), "{p}: {found} instead of {expected}");
+            assert!((answer.gradient.length() - 1.0).abs() < 1e-5, "{p}: {answer:?}");
+            assert!(answer.closest_point.is_finite() && answer.face < 1 << 16, "{p}: {answer:?}");
+        }
+    }
+    let numbers: Vec<f32> = points.iter().flat_map(|p| p.as_vec3().to_array()).collect();
+    let numbers = DeviceArray::upload(&device, &numbers).expect("fits");
+    let count = points.len() * instances.len();
+    let answers = DeviceAnswers::empty(&device, count).expect("fits");
+    uploaded.signed_distances_into(&numbers, &instances, &answers).expect("answers");
+    let distances = answers.signed_distances.read(&device).expect("numbers");
+    let gradients = answers.gradients.read(&device).expect("numbers");
+    assert!(answers.faces.read(&device).expect("numbers").iter().all(|&face| face < 1 << 16));
+    for (k, (distance, gradient)) in distances.iter().zip(gradients.chunks(3)).enumerate() {
+        let (shape, p) = (&shapes[k / points.len()], points[k % points.len()]);
+        let expected = expected(shape, p).clamp(-largest, largest);
+        let off = (f64::from(*distance) - expected).abs();
+        assert!(off < 2e-6 * p.length(), "{p}: {distance} instead of {expected}");
+        assert!((Vec3::from_slice(gradient).length() - 1.0).abs() < 1e-5, "{p}: {gradient:?}");
     }
 }
 

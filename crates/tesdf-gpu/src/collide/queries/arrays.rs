@@ -54,7 +54,7 @@ impl GpuShapes {
     /// call returns without waiting for the result.
     ///
     /// Points are `f32`. So far from the origin of the world the answers have the rounding error of
-    /// the points.
+    /// the points. A distance beyond `f32` is the largest `f32`.
     ///
     /// # Errors
     /// [`GpuError::Instance`] for an instance of a shape that was not uploaded here;

@@ -12,7 +12,7 @@ use super::scene::{GpuShapeId, GpuShapes};
 use crate::GpuError;
 use crate::device::Buffer;
 use crate::kernels::field::query::{
-    ANSWER_ROWS, AnswersLaunch, BatchLaunch, InstancesLaunch, signed_distances,
+    ANSWER_ROWS, AnswersLaunch, BatchLaunch, FARTHEST, InstancesLaunch, signed_distances,
 };
 
 /// The answer to a query, in the world frame.
@@ -22,7 +22,7 @@ use crate::kernels::field::query::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorldAnswer {
     /// Distance to the nearest face, negative inside, in the world's unit. The error is at most
-    /// 2e-6 of the instance's diagonal.
+    /// 2e-6 of the instance's diagonal, or of the distance where that is larger.
     pub signed_distance: f64,
     /// Unit gradient of the signed distance.
     pub gradient: DVec3,
@@ -47,6 +47,11 @@ pub use crate::kernels::GROUP;
 /// Answers per launch; they take 4 MiB.
 const LAUNCH: usize = 1 << 17;
 
+/// How many times as far out a point is as the point that the kernel looks from.
+fn farther(p: DVec3) -> f64 {
+    (p.abs().max_element() / f64::from(FARTHEST)).max(1.0)
+}
+
 /// The rows of an answer, as the kernel writes them.
 type AnswerRows = [[f32; 4]; ANSWER_ROWS as usize];
 
@@ -66,7 +71,7 @@ impl GpuShapes {
         let device = self.device();
         let placed = self.place(instances)?;
         let split_rows = |p: &DVec3| {
-            let (high, low) = split(if p.is_finite() { *p } else { DVec3::ZERO });
+            let (high, low) = split(if p.is_finite() { *p / farther(*p) } else { DVec3::ZERO });
             [high.extend(0.0).to_array(), low.extend(0.0).to_array()]
         };
         let rows: Vec<[f32; 4]> = points.iter().flat_map(split_rows).collect();
@@ -92,7 +97,13 @@ impl GpuShapes {
         }
         let of_instance = |(i, (shape, _)): (usize, &(GpuShapeId, Placement))| {
             let answer = |(k, point): (usize, &DVec3)| match point.is_finite() {
-                true => self.world_answer(*shape, &placed.placed[i], found[i * points.len() + k]),
+                true => {
+                    let found = found[i * points.len() + k];
+                    let answer = self.world_answer(*shape, &placed.placed[i], found);
+                    let signed_distance =
+                        (answer.signed_distance * farther(*point)).clamp(f64::MIN, f64::MAX);
+                    WorldAnswer { signed_distance, ..answer }
+                }
                 false => WorldAnswer::NONE,
             };
             points.iter().enumerate().map(answer).collect()
@@ -101,11 +112,11 @@ impl GpuShapes {
     }
 
     fn world_answer(&self, shape: GpuShapeId, at: &Placed, (rows, face): (AnswerRows, u32)) -> WorldAnswer {
-        let [[x, y, z, distance], closest] = rows;
+        let [[x, y, z, distance], [u, v, w, farther]] = rows;
         WorldAnswer {
-            signed_distance: f64::from(distance) * at.unit,
+            signed_distance: f64::from(distance) * f64::from(farther) * at.unit,
             gradient: at.rotate(Vec3::new(x, y, z)),
-            closest_point: at.to_world(Vec3::from_slice(&closest)),
+            closest_point: at.to_world(Vec3::new(u, v, w)),
             face: match &self.shapes[shape.0 as usize] {
                 Shape::Mesh(asset) => asset.face_id(face as usize),
                 _ => face,

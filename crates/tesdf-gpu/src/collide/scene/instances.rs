@@ -1,13 +1,13 @@
 //! The instances of a scene, in the layout of the device.
 use tesdf::collide::internal::Ahead;
-use tesdf::collide::{CollideOptions, InstanceId, InstancePair, Scene, ShapeId, instance_pairs};
+use tesdf::collide::{CollideOptions, Instance, InstanceId, Scene, ShapeId, instance_pairs};
 
 use super::placed::{FieldFrame, Placed};
 use crate::GpuError;
 use crate::kernels::broad::ahead;
 use crate::kernels::broad::pairs::{INSTANCE_ROWS, INSTANCE_WORDS};
 
-/// All instances, sorted by world and then by id.
+/// The instances whose contacts kernels find, sorted by world and then by id.
 pub struct Instances {
     /// Ids of the instances.
     pub ids: Vec<InstanceId>,
@@ -30,8 +30,8 @@ pub struct Instances {
 }
 
 impl Instances {
-    /// Collects the instances of a scene. `shape_ids` and `frames` belong to the uploaded shapes,
-    /// sorted by id. With more than `max_tests` pairs of bounds to test, the pairs are found here.
+    /// Collects the instances of the uploaded shapes, to which `shape_ids`, sorted, and `frames`
+    /// belong. With more than `max_tests` pairs of bounds to test, the pairs are found here.
     pub fn new(
         scene: &Scene,
         options: &CollideOptions,
@@ -39,7 +39,12 @@ impl Instances {
         frames: &[FieldFrame],
         max_tests: u64,
     ) -> Result<Self, GpuError> {
-        let mut order: Vec<(u32, InstanceId)> = scene.instances().map(|(id, i)| (i.world, id)).collect();
+        let number_of = |instance: &Instance| shape_ids.binary_search(&instance.shape).ok();
+        let mut order: Vec<(u32, InstanceId)> = scene
+            .instances()
+            .filter(|(_, instance)| number_of(instance).is_some())
+            .map(|(id, i)| (i.world, id))
+            .collect();
         order.sort_unstable();
         let mut all = Self {
             ids: order.iter().map(|&(_, id)| id).collect(),
@@ -59,35 +64,31 @@ impl Instances {
             }
             let instance = scene.instance(id)?;
             let shape = scene.shape(instance.shape)?;
-            let number = shape_ids.binary_search(&instance.shape).map_err(|_| GpuError::Instance {
-                instance: id.0 as usize,
-                reason: format!("shape {} is not on the device; upload the scene again", instance.shape.0),
-            })?;
+            let Some(number) = number_of(instance) else { continue };
             let placed = Placed::new(frames[number], instance.placement());
             all.rows.extend(placed.rows());
             motions
                 .extend(ahead::rows(&Ahead::new(instance, shape, options.speculative_time), placed.origin));
-            let groups = instance.groups;
-            all.words.extend([number as u32, end as u32, groups.memberships, groups.filter]);
+            let (groups, still) = (instance.groups, u32::from(scene.is_still(id)));
+            all.words.extend([number as u32, end as u32, groups.memberships, groups.filter, still]);
             all.placed.push(placed);
             all.shapes.push(number);
         }
         all.rows.append(&mut motions);
-        let mut place = vec![0u32; order.iter().map(|&(_, id)| id.0 as usize + 1).max().unwrap_or(0)];
-        all.ids.iter().enumerate().for_each(|(k, id)| place[id.0 as usize] = k as u32);
-        let mut excluded: Vec<[u32; 2]> = scene
-            .excluded()
-            .map(|(a, b)| [place[a.0 as usize], place[b.0 as usize]])
-            .map(|[a, b]| [a.min(b), a.max(b)])
-            .collect();
+        let ids = scene.instances().last().map_or(0, |(last, _)| last.0 as usize + 1);
+        let mut places: Vec<Option<u32>> = vec![None; ids];
+        all.ids.iter().zip(0..).for_each(|(id, k)| places[id.0 as usize] = Some(k));
+        let of_pair = |a: InstanceId, b: InstanceId| Some([places[a.0 as usize]?, places[b.0 as usize]?]);
+        let mut excluded: Vec<[u32; 2]> =
+            scene.excluded().filter_map(|(a, b)| of_pair(a, b)).map(|[a, b]| [a.min(b), a.max(b)]).collect();
         excluded.sort_unstable();
         all.excluded = excluded.into_flattened();
         let tests: u64 =
             order.chunk_by(|(v, _), (w, _)| v == w).map(|world| (world.len() as u64).pow(2) / 2).sum();
         if tests > max_tests {
             let pairs = instance_pairs(scene, options.contact_distance, options.speculative_time)?;
-            let places = |p: &InstancePair| [p.first, p.second].map(|id| place[id.0 as usize]);
-            all.pairs = Some(pairs.iter().flat_map(places).collect());
+            let found = pairs.iter().filter_map(|pair| of_pair(pair.first, pair.second));
+            all.pairs = Some(found.flatten().collect());
         }
         Ok(all)
     }

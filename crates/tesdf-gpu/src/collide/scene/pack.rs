@@ -22,6 +22,8 @@ pub struct Packed {
     pub table: Vec<u32>,
     pub words: Vec<u32>,
     pub rows: Vec<[f32; 4]>,
+    /// Number of words of the fans before the next shape.
+    fans: usize,
 }
 
 impl Packed {
@@ -106,7 +108,7 @@ impl Packed {
         set(shapes::FACE_COUNT, mesh.faces.len() as u32);
         set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
         set(shapes::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
-        set(shapes::FANS, self.fans(asset)?);
+        set(shapes::FANS, self.fans_at(asset)?);
         if let Some(sign) = &sign {
             set(shapes::RULE, rule_of(sign));
             let triangles = [&sign.triangles[..], &sign.closing].concat();
@@ -150,22 +152,15 @@ impl Packed {
         Ok(row)
     }
 
-    /// Appends the fans of all vertices, and returns their place for the table.
-    fn fans(&mut self, asset: &TeSdf) -> Result<u32, String> {
-        if !(asset.faces_enclose_the_solid() && asset.is_detected_on_devices()) {
+    /// The place of the fans of a mesh for the table. [`fans`] makes them.
+    fn fans_at(&mut self, asset: &TeSdf) -> Result<u32, String> {
+        if !has_fans(asset) {
             return Ok(shapes::NONE);
         }
-        let (clear, scale) = (asset.corner_cones(), asset.arrays().frame.scale);
-        let fans = || (0..clear.len() as u32).map(|vertex| asset.faces_at(vertex));
-        let of_faces = 3 * asset.face_count();
-        let end = self.words.len() + 2 * clear.len() + 1 + of_faces;
-        let mut start = u32::try_from(end).map_err(too_many_words)? - of_faces as u32;
-        let mut words = Vec::with_capacity(2 * clear.len() + 1);
-        for (fan, &clear) in fans().zip(clear) {
-            words.extend([start, ((f64::from(clear) * scale) as f32).to_bits()]);
-            start += fan.len() as u32;
-        }
-        self.words_at(words.into_iter().chain([start]).chain(fans().flatten().copied()))
+        let start = u32::try_from(self.fans).map_err(too_many_words)?;
+        self.fans += words_of_fans(asset);
+        u32::try_from(self.fans).map_err(too_many_words)?;
+        Ok(start)
     }
 
     fn words_at(&mut self, words: impl Iterator<Item = u32>) -> Result<u32, String> {
@@ -200,6 +195,37 @@ fn rule_of(sign: &SignArrays) -> u32 {
         InsideRule::Odd => rule::ODD,
         InsideRule::Winding | InsideRule::Sheet { .. } => rule::WINDING,
     }
+}
+
+/// Whether a mesh has normal cones, for which kernels need its fans.
+fn has_fans(asset: &TeSdf) -> bool {
+    asset.faces_enclose_the_solid() && asset.is_detected_on_devices()
+}
+
+fn words_of_fans(asset: &TeSdf) -> usize {
+    2 * asset.arrays().vertices.len() + 1 + 3 * asset.face_count()
+}
+
+/// The words of [`Fans`](shapes::Fans) for shapes that were packed.
+pub fn fans(shapes: &[Shape]) -> Vec<u32> {
+    let mut words = Vec::new();
+    for shape in shapes {
+        let Shape::Mesh(asset) = shape else { continue };
+        if !has_fans(asset) {
+            continue;
+        }
+        let (clear, scale) = (asset.corner_cones(), asset.arrays().frame.scale);
+        let fans = || (0..clear.len() as u32).map(|vertex| asset.faces_at(vertex));
+        // `Packed::add` has refused more words than `u32` counts.
+        let mut start = (words.len() + 2 * clear.len() + 1) as u32;
+        for (fan, &clear) in fans().zip(clear) {
+            words.extend([start, ((f64::from(clear) * scale) as f32).to_bits()]);
+            start += fan.len() as u32;
+        }
+        words.push(start);
+        words.extend(fans().flatten());
+    }
+    words
 }
 
 fn too_many_words(_: std::num::TryFromIntError) -> String {

@@ -2,11 +2,11 @@
 use tesdf::collide::Shape;
 
 use super::movable::Moving;
-use super::pack::Packed;
+use super::pack::{Packed, fans};
 use crate::GpuError;
 use crate::device::{Buffer, Device};
 use crate::kernels::field::rule::{BY_CELLS, GENERALIZED};
-use crate::kernels::field::shapes::{RULE, Rules, STRIDE, ShapesLaunch, TURNED};
+use crate::kernels::field::shapes::{FansLaunch, RULE, Rules, STRIDE, ShapesLaunch, TURNED};
 
 /// A list of shapes in the memory of a device.
 #[derive(Clone)]
@@ -15,6 +15,8 @@ pub struct GpuShapes {
     pub(super) table: Buffer,
     words: Buffer,
     rows: Buffer,
+    /// The fans of vertices, once a detection has needed them.
+    fans: Option<Buffer>,
     pub(crate) shapes: Vec<Shape>,
     /// For each shape, the data to move its vertices; `None` for a shape without a conforming
     /// domain.
@@ -33,9 +35,10 @@ pub struct GpuShapeId(pub(crate) u32);
 pub struct ShapeBytes {
     /// Kind of each shape, and the start of its arrays.
     pub table: usize,
-    /// Forests, lists, palettes, bounds of cells, children of face-tree nodes, vertices of faces, and
-    /// faces of vertices.
+    /// Forests, lists, palettes, bounds of cells, children of face-tree nodes, vertices of faces.
     pub words: usize,
+    /// Faces of vertices; 0 until contacts of faces have stayed on the device.
+    pub fans: usize,
     /// Faces, boxes of the face trees, balls of the meshlets.
     pub rows: usize,
 }
@@ -62,6 +65,7 @@ impl GpuShapes {
             table: device.upload("shapes", &packed.table)?,
             words: device.upload("words of shapes", &packed.words)?,
             rows: device.upload("rows of shapes", &packed.rows)?,
+            fans: None,
             shapes: shapes.to_vec(),
             moving: packed.table.chunks(STRIDE as usize).zip(shapes).map(Moving::new).collect(),
             moved: false,
@@ -72,6 +76,19 @@ impl GpuShapes {
     /// The buffers as an argument of kernels.
     pub(crate) fn argument(&self) -> ShapesLaunch {
         ShapesLaunch::new(self.table.words(), self.words.words(), self.rows.rows(), self.rules)
+    }
+
+    /// Uploads the fans of vertices, unless they are there.
+    pub(crate) fn add_fans(&mut self) -> Result<(), GpuError> {
+        if self.fans.is_none() {
+            self.fans = Some(self.device.upload("faces of vertices", &fans(&self.shapes))?);
+        }
+        Ok(())
+    }
+
+    /// The fans as an argument of kernels, which are launched only after `add_fans`.
+    pub(crate) fn fans(&self) -> FansLaunch {
+        FansLaunch::new(self.fans.as_ref().unwrap_or(&self.words).words())
     }
 
     /// The device that holds the shapes.
@@ -101,7 +118,12 @@ impl GpuShapes {
 
     /// Memory of the shapes on the device, in bytes.
     pub fn bytes(&self) -> ShapeBytes {
-        ShapeBytes { table: self.table.bytes(), words: self.words.bytes(), rows: self.rows.bytes() }
+        ShapeBytes {
+            table: self.table.bytes(),
+            words: self.words.bytes(),
+            rows: self.rows.bytes(),
+            fans: self.fans.as_ref().map_or(0, Buffer::bytes),
+        }
     }
 
     /// The buffers, for kernels that write shapes.

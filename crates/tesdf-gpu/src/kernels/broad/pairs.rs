@@ -16,7 +16,8 @@ use super::ordered_pair::{OrderedPair, OrderedPairs};
 pub struct Instances {
     /// A pose for each instance, then a motion for each.
     pub rows: Box<[Row]>,
-    /// [`INSTANCE_WORDS`] words for each: shape, end of the world, memberships, filter.
+    /// [`INSTANCE_WORDS`] words for each: shape, end of the world, memberships, filter, 1 when it
+    /// is still.
     pub words: Box<[u32]>,
     pub count: u32,
     pub contact_distance: f32,
@@ -25,7 +26,7 @@ pub struct Instances {
 /// Rows of an instance.
 pub const INSTANCE_ROWS: u32 = POSE_ROWS + MOTION_ROWS;
 /// Words of an instance.
-pub const INSTANCE_WORDS: u32 = 4;
+pub const INSTANCE_WORDS: u32 = 5;
 /// Rows of an instance's bounds: center as high and low `f32`, half extents.
 pub const BOUNDS_ROWS: u32 = 3;
 
@@ -72,6 +73,12 @@ impl Instances {
     fn groups(&self, instance: u32) -> Groups {
         let at = (instance * INSTANCE_WORDS) as usize;
         Groups { memberships: self.words[at + 2], filter: self.words[at + 3] }
+    }
+
+    /// Whether two instances are still, so that they are no pair.
+    fn are_still(&self, i: u32, j: u32) -> bool {
+        let (first, second) = ((i * INSTANCE_WORDS + 4u32) as usize, (j * INSTANCE_WORDS + 4u32) as usize);
+        self.words[first] == 1u32 && self.words[second] == 1u32
     }
 
     fn pose(&self, instance: u32) -> Pose {
@@ -210,7 +217,7 @@ pub fn instance_pairs(
         while j < end {
             let other = world_bounds(bounds, j);
             let gap = own.gap(other);
-            let meet = groups.meet(instances.groups(j));
+            let meet = groups.meet(instances.groups(j)) && !instances.are_still(i, j);
             let planes = is_plane && shapes.field(instances.shape(j)).entry(KIND) == PLANE;
             // Only bodies that are near each other are worth the bound of their relative motion.
             if gap <= widest + instances.motion(j) && meet && !planes && !excluded.contain(i, j) {

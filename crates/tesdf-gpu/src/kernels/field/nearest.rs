@@ -37,6 +37,13 @@ pub fn none_within(squared: f32) -> Nearest {
     Nearest { squared, face: NONE.runtime() }
 }
 
+/// The start of a search of all faces. It names a face, which is the result where all are as far as
+/// [`FAR`]: a body may be that much larger than another one.
+#[cube]
+pub fn any_face() -> Nearest {
+    Nearest { squared: FAR.runtime(), face: 0u32.runtime() }
+}
+
 #[cube]
 impl Nearest {
     /// The nearer of two faces. At equal distances, the face with the lower index.
@@ -117,7 +124,7 @@ impl Field<'_> {
     /// The nearest face among every `step`-th face of a list, starting at `first`. At equal
     /// distances, the face with the lowest index.
     pub fn nearest_in_list(self, list: List, first: u32, step: u32, p: V3) -> Nearest {
-        let mut found = none_within(FAR.runtime());
+        let mut found = any_face();
         let mut i = first;
         while i < list.count {
             found = found.or(self.to_face(self.listed(list, i), p));
@@ -145,14 +152,20 @@ impl Field<'_> {
     /// The nearest of all faces, by the face tree. The search may miss faces whose squared distance
     /// is above `limit`.
     pub fn nearest_in_tree(self, p: V3, limit: f32) -> Nearest {
-        self.searched_tree(p, limit).nearest
+        self.searched_tree(p, none_within(limit)).nearest
     }
 
-    fn searched_tree(self, p: V3, limit: f32) -> SearchedTree {
+    /// The nearest of all faces, by the face tree.
+    pub fn nearest_of_all(self, p: V3) -> Nearest {
+        self.searched_tree(p, any_face()).nearest
+    }
+
+    /// Searches for a nearer face than `start`.
+    fn searched_tree(self, p: V3, start: Nearest) -> SearchedTree {
         let children = self.entry(CHILDREN);
         let mut words = Array::<u32>::new(TREE_DEPTH);
         let mut bounds = Array::<f32>::new(TREE_DEPTH);
-        let mut found = none_within(limit);
+        let mut found = start;
         let mut distances = 0u32;
         let mut top = 1usize;
         words[0] = 0u32;
@@ -194,7 +207,7 @@ impl Field<'_> {
             if cell.is_listed() {
                 distances = self.list(cell.offset()).count;
             } else {
-                distances = self.searched_tree(p, FAR.runtime()).distances;
+                distances = self.searched_tree(p, any_face()).distances;
             }
         }
         distances
@@ -207,7 +220,7 @@ impl Field<'_> {
             if cell.is_listed() && self.has_exact_lists() {
                 distances = self.list(cell.offset()).count;
             } else {
-                distances = self.searched_tree(p, FAR.runtime()).distances;
+                distances = self.searched_tree(p, any_face()).distances;
             }
         }
         distances
@@ -215,12 +228,12 @@ impl Field<'_> {
 
     /// The nearest face to a point of a cell. A simple shape has no faces.
     pub fn nearest(self, cell: Cell, p: V3) -> Nearest {
-        let mut found = none_within(FAR.runtime());
+        let mut found = any_face();
         if self.is_mesh() {
             if cell.is_listed() {
                 found = self.nearest_in_list(self.list(cell.offset()), 0u32, 1u32, p);
             } else {
-                found = self.nearest_in_tree(p, FAR.runtime());
+                found = self.nearest_of_all(p);
             }
         }
         found

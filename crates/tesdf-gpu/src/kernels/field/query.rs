@@ -5,7 +5,8 @@ use super::super::math::pose::{FarPoint, pose};
 use super::super::math::vector::{Row, V3, from_bits, pick, row_of, to_bits, v3, xyz, zero};
 use super::shapes::Shapes;
 
-/// Rows of an answer in the field's frame: gradient and distance, closest point.
+/// Rows of an answer in the field's frame: gradient and distance; closest point, and the number by
+/// which the distance is to be multiplied.
 pub const ANSWER_ROWS: u32 = 2;
 
 /// The instances of a query.
@@ -20,7 +21,7 @@ pub struct Instances {
 /// The answers of a launch.
 #[derive(CubeType, CubeLaunch)]
 pub struct Answers {
-    /// [`ANSWER_ROWS`] rows for each answer: gradient and distance, closest point.
+    /// [`ANSWER_ROWS`] rows for each answer.
     pub rows: Box<[Row]>,
     /// Index of the nearest face for each answer.
     pub faces: Box<[u32]>,
@@ -51,14 +52,20 @@ pub fn signed_distances(
         let instance = pair / batch.points;
         let at = (2u32 * (pair % batch.points)) as usize;
         let p = FarPoint { high: xyz(points[at]), low: xyz(points[at + 1]) };
-        let local = pose(&instances.poses, instance).to_local(p);
-        let v = shapes.field(instances.shapes[instance as usize]).answer(local);
+        let seen = pose(&instances.poses, instance).see(p);
+        let v = shapes.field(instances.shapes[instance as usize]).answer(seen.local);
         let out = (index * ANSWER_ROWS) as usize;
         answers.rows[out] = row_of(v.gradient, v.distance);
-        answers.rows[out + 1] = row_of(v.point, 0.0f32);
+        answers.rows[out + 1] = row_of(v.point, seen.farther);
         answers.faces[index as usize] = v.face;
     }
 }
+
+/// Points with a greater coordinate are looked at from there, because differences and products of
+/// it may not be `f32`.
+pub const FARTHEST: f32 = 1e37;
+/// The largest `f32`, for distances that are larger.
+const LARGEST: f32 = f32::MAX;
 
 /// Answers in the world frame. A vector takes three numbers.
 #[derive(CubeType, CubeLaunch)]
@@ -86,10 +93,13 @@ pub fn world_distances(
         let at = (3u32 * (index % point_count)) as usize;
         let (x, y, z) = (points[at], points[at + 1], points[at + 2]);
         let finite = is_finite(x) && is_finite(y) && is_finite(z);
-        let p = FarPoint { high: pick(finite, v3(x, y, z), zero()), low: zero() };
+        let p = pick(finite, v3(x, y, z), zero());
+        let farther = (p.abs().greatest() / FARTHEST).max(1.0f32);
         let frame = pose(&instances.poses, instance);
-        let v = shapes.field(instances.shapes[instance as usize]).answer(frame.to_local(p));
-        answers.distances[index as usize] = or_nan(finite, v.distance * frame.unit);
+        let seen = frame.see(FarPoint { high: p * (1.0f32 / farther), low: zero() });
+        let v = shapes.field(instances.shapes[instance as usize]).answer(seen.local);
+        let distance = ((v.distance * frame.unit) * seen.farther) * farther;
+        answers.distances[index as usize] = or_nan(finite, distance.clamp(-LARGEST, LARGEST));
         put(&mut answers.gradients, index, finite, frame.rotation.rotate(v.gradient));
         put(&mut answers.closest, index, finite, frame.to_world(v.point));
         answers.faces[index as usize] = select(finite, v.face, u32::MAX);

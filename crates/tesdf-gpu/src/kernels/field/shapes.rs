@@ -20,6 +20,22 @@ pub struct Shapes {
     pub rules: Rules,
 }
 
+/// The fans of the vertices of meshes: the faces that have a vertex.
+#[derive(CubeType, CubeLaunch)]
+pub struct Fans {
+    /// For each mesh, two words for each vertex: the word of its first face, and the bits of the
+    /// distance from it within which there are only these faces, negative where they are not
+    /// convex, and 0 where this is not known. Then the end of the last fan, and the faces.
+    pub words: Box<[u32]>,
+}
+
+#[cube]
+impl Fans {
+    pub fn word(&self, at: u32) -> u32 {
+        self.words[at as usize]
+    }
+}
+
 /// What kernels need to know about the sides of shapes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Rules {
@@ -127,11 +143,8 @@ pub const CLOSING_COUNT: u32 = 43;
 pub const REACH_BEYOND: u32 = 44;
 /// 1 when faces may have the inside in front of them, otherwise 0.
 pub const TURNED: u32 = 45;
-/// Word of the first vertex's fan, the faces that have the vertex. A vertex has two words: the word
-/// of its first face, and the bits of the distance from it within which there are only these faces,
-/// negative where they are not convex, and 0 where this is not known. The word after the last vertex
-/// is the end of the last fan. [`NONE`] where faces do not enclose the solid: such surfaces have no
-/// normal cones.
+/// Word of the first vertex in the buffer of [`Fans`]. [`NONE`] where faces do not enclose the
+/// solid: such surfaces have no normal cones.
 pub const FANS: u32 = 46;
 /// Diagonal of the bounds; 0 for a plane.
 pub const DIAGONAL: u32 = 47;

@@ -9,7 +9,7 @@ use tesdf::query::internal;
 use super::super::math::triangle::part_of;
 use super::super::math::vector::{V3, pick, same};
 use super::locate::{Cell, no_cell};
-use super::nearest::{FAR, Nearest};
+use super::nearest::Nearest;
 use super::shapes::{Field, FieldExpand};
 
 /// The value of a field at a point.
@@ -119,7 +119,7 @@ impl Field<'_> {
             let nearest = if cell.is_listed() && self.has_exact_lists() {
                 self.nearest_in_list(self.list(cell.offset()), 0u32, 1u32, p)
             } else {
-                self.nearest_in_tree(p, FAR.runtime())
+                self.nearest_of_all(p)
             };
             self.mesh_value(cell, p, nearest)
         } else {

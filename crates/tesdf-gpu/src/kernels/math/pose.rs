@@ -44,6 +44,20 @@ impl FarPoint {
     }
 }
 
+/// Farther out than this in the frame of a field, a point is looked at from nearer. Squares of
+/// distances stay below [`FAR`](super::super::field::nearest::FAR).
+const OUT: f32 = 1e14;
+
+/// A point in the frame of a field, on the way from its origin to the point that is meant.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Seen {
+    pub local: V3,
+    /// How many times as far out the point that is meant is: 1 up to [`OUT`]. Farther out, so is its
+    /// distance, up to the share of the body in it.
+    pub farther: f32,
+}
+
 /// The frame of an instance's field in the world.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
@@ -71,6 +85,14 @@ impl Pose {
     /// Transforms a point from the world to the frame.
     pub fn to_local(self, p: FarPoint) -> V3 {
         self.rotation.rotate_back(p.from(self.origin)) * (1.0f32 / self.unit)
+    }
+
+    /// Looks at a point of the world from the frame.
+    pub fn see(self, p: FarPoint) -> Seen {
+        let away = p.from(self.origin);
+        let farther = (away.abs().greatest() / (OUT * self.unit)).max(1.0f32);
+        let near = away * (1.0f32 / farther);
+        Seen { local: self.rotation.rotate_back(near) * (1.0f32 / self.unit), farther }
     }
 
     /// Transforms a point from the frame to the world, rounded to `f32`.

@@ -6,7 +6,7 @@
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::ROUNDING;
-use super::super::broad::ordered_pair::OrderedPairs;
+use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs};
 use super::super::counters::{self, Counters};
 use super::super::field::nearest::FAR;
 use super::super::field::shapes::Shapes;
@@ -24,6 +24,9 @@ const ROUNDS: u32 = 96;
 /// Closer to the surface than this, a polygon may cross it. On the processor, which computes in
 /// `f64`, the limit is 1e-9 (`CLEAR` in `tesdf::collide::narrow`).
 pub const CLEAR: f32 = 1e-6;
+/// The smallest tolerance, in the frame of a field: a few times the rounding error of distances in
+/// `f32`.
+const FINEST: f32 = 1e-6;
 
 /// The goal of a search: distances up to `reach` that are lower than the best distance so far by
 /// more than `tolerance`.
@@ -250,6 +253,14 @@ pub struct AskedExact {
     pub cos_theta: f32,
 }
 
+#[cube]
+impl AskedExact {
+    /// The tolerance in the field of an ordered pair.
+    pub fn tolerance(&self, pair: OrderedPair) -> f32 {
+        self.tolerances[pair.b as usize].max(FINEST)
+    }
+}
+
 /// Finds the contact of a polygon per group.
 #[cube(launch, create_dummy_kernel)]
 pub fn narrow_exact(
@@ -273,7 +284,7 @@ pub fn narrow_exact(
         let cell = field.cell(item.cell);
         let region = region(field, cell, part);
         let reach = pairs.reach_of(pair, part);
-        let goal = Goal { reach, tolerance: asked.tolerances[pair.b as usize] };
+        let goal = Goal { reach, tolerance: asked.tolerance(pair) };
         let found = minimize(region, polygons.polygon(number, part), normal, goal, &mut pool);
         pool.work.add_to(counters);
         if found.best.distance <= reach && UNIT_POS == 0u32 {

@@ -210,7 +210,7 @@ pub fn narrow_exact_faces(
     if number < count {
         let item = polygons.items.get(number);
         let pair = pairs.get(item.pair);
-        let tolerance = asked.tolerances[pair.b as usize];
+        let tolerance = asked.tolerance(pair);
         let face = facing(shapes, pairs, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
         let region = everywhere(face.field, face.part);
         let goal = Goal { reach: face.reach, tolerance };

@@ -16,8 +16,6 @@ pub struct Variant {
     pub subgroups: bool,
     /// Whether the kernel counts evaluations.
     pub counting: bool,
-    /// Whether it takes whole faces instead of polygons in cells.
-    pub whole: bool,
 }
 
 /// Shared memory for an exchange.

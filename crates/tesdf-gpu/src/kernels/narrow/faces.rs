@@ -11,8 +11,8 @@ use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, Counters};
 use super::super::field::list::List;
 use super::super::field::locate::Cell;
-use super::super::field::nearest::{FAR, Nearest};
-use super::super::field::shapes::{Field, NONE, Shapes};
+use super::super::field::nearest::{FAR, Nearest, any_face};
+use super::super::field::shapes::{Field, Shapes};
 use super::super::field::value::Value;
 use super::super::math::triangle::Face;
 use super::super::math::vector::{Row, V3, row_of, xyz};
@@ -24,8 +24,6 @@ use super::polygon_distance::Polygon;
 /// Parameters of Face-TES.
 #[derive(CubeType, CubeLaunch)]
 pub struct Asked {
-    /// Tolerance for each instance that has the field, in its frame. Used for whole faces.
-    pub tolerances: Box<[f32]>,
     /// Largest number of steps of Frank–Wolfe.
     pub iterations: u32,
     /// A contact is dropped when the cosine between its gradient and the face's normal is above
@@ -36,7 +34,7 @@ pub struct Asked {
 /// The list of a cell, shared by the threads of a group.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-pub struct SharedList {
+struct SharedList {
     cell: Cell,
     faces: List,
     /// The face that this thread keeps in registers, and its index. A thread beyond the end of the
@@ -56,12 +54,11 @@ fn lane_of(#[comptime] lanes: u32) -> u32 {
 }
 
 #[cube]
-pub fn share_list(field: Field<'_>, cell: Cell, #[comptime] variant: Variant) -> SharedList {
+fn share_list(field: Field<'_>, cell: Cell, #[comptime] variant: Variant) -> SharedList {
     let lanes = comptime!(variant.lanes);
     let listed = cell.is_listed();
     let faces = field.list(select(listed, cell.offset(), 0u32));
-    // Where each point has its own cell, the group evaluates one point at a time.
-    let shared = select(variant.whole, LANES, width_for(select(listed, faces.count, 0u32)));
+    let shared = width_for(select(listed, faces.count, 0u32));
     let lane = lane_of(lanes);
     let mut position = 0u32;
     if listed && lane % shared < faces.count {
@@ -77,45 +74,30 @@ pub fn share_list(field: Field<'_>, cell: Cell, #[comptime] variant: Variant) ->
     }
 }
 
-/// The field at a point, and the number of faces that each point's list has.
-#[derive(CubeType, Clone, Copy)]
-#[expand(derive(Clone, Copy))]
-struct Evaluated {
-    value: Value,
-    distances: u32,
-}
-
 #[cube]
 impl SharedList {
     /// The field at a point of the cell. `width` threads evaluate it together, and each such part
-    /// of the group may have its own point. With a whole face, all threads evaluate one point, in
-    /// the cell that has it.
-    fn value(self, field: Field<'_>, p: V3, exchange: &mut Exchange) -> Evaluated {
+    /// of the group may have its own point.
+    fn value(self, field: Field<'_>, p: V3, exchange: &mut Exchange) -> Value {
         let lanes = comptime!(exchange.variant.lanes);
-        let mut cell = self.cell;
-        if comptime!(exchange.variant.whole) {
-            cell = field.cell_at(p);
-        }
-        let mut found = Nearest { squared: FAR.runtime(), face: NONE.runtime() };
-        let mut distances = 0u32;
-        if field.is_mesh() && cell.is_listed() {
+        let cell = self.cell;
+        let mut found = any_face();
+        if self.is_shared(field) {
             let first = select(lanes == 1u32, 0u32, UNIT_POS % self.width);
-            if comptime!(exchange.variant.whole) {
-                let faces = field.list(cell.offset());
-                distances = faces.count;
-                found = field.nearest_in_list(faces, first, lanes, p);
-            } else {
-                distances = self.faces.count;
-                if first < self.faces.count {
-                    found = Nearest { squared: self.own.distance_squared(p), face: self.position };
-                }
-                found = found.or(field.nearest_in_list(self.faces, first + lanes, lanes, p));
+            if first < self.faces.count {
+                found = Nearest { squared: self.own.distance_squared(p), face: self.position };
             }
+            found = found.or(field.nearest_in_list(self.faces, first + lanes, lanes, p));
             found = exchange.least(found, self.width);
         } else {
             found = field.nearest(cell, p);
         }
-        Evaluated { value: field.value_near(cell, p, found), distances }
+        field.value_near(cell, p, found)
+    }
+
+    /// Whether the threads share a list.
+    fn is_shared(self, field: Field<'_>) -> bool {
+        field.is_mesh() && self.cell.is_listed()
     }
 }
 
@@ -139,7 +121,7 @@ struct Iterate {
 /// all of this, so that the long code of the field stands in the kernel once.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-pub struct Search {
+struct Search {
     /// Number of the next evaluation, and the number at which the search ends.
     evaluation: u32,
     end: u32,
@@ -147,8 +129,8 @@ pub struct Search {
     n: u32,
     here: Iterate,
     /// The best point so far, and its distance.
-    pub best: Weights,
-    pub distance: f32,
+    best: Weights,
+    distance: f32,
     /// Evaluations by the group so far, and distances of points and faces in them.
     made: u32,
     distances: u32,
@@ -215,7 +197,7 @@ impl Search {
     }
 
     /// Counts the evaluations, when the variant does.
-    pub fn count(&self, counters: &Counters, #[comptime] variant: Variant) {
+    fn count(&self, counters: &Counters, #[comptime] variant: Variant) {
         let counting = comptime!(variant.counting);
         if counting && lane_of(comptime!(variant.lanes)) == 0u32 {
             counters.add(counters::EVALUATIONS, self.made);
@@ -264,7 +246,7 @@ struct Target {
 /// The field at the best point. Only the contact needs it, so it waits in shared memory and takes
 /// no registers.
 #[derive(CubeType)]
-pub struct Best {
+struct Best {
     rows: Shared<[Row]>,
     words: Shared<[u32]>,
 }
@@ -349,7 +331,7 @@ fn lowest_of(mine: Found, search: Search, vertex: u32, list: SharedList, exchang
 
 /// Minimizes the field over a polygon. `best` gets the field at the best point.
 #[cube]
-pub fn minimize(
+fn minimize(
     field: Field<'_>,
     list: SharedList,
     polygon: Polygon<'_>,
@@ -389,9 +371,9 @@ pub fn minimize(
         if !next.is_known {
             search.made += 1u32;
             let vertices = list.points.min(n + 1u32 - search.evaluation);
-            let evaluated = list.value(field, part.at(next.at.s, next.at.t), exchange);
-            let here = evaluated.value;
-            search.distances += select(next.is_vertex, vertices, 1u32) * evaluated.distances;
+            let here = list.value(field, part.at(next.at.s, next.at.t), exchange);
+            let faces = select(list.is_shared(field), list.faces.count, 0u32);
+            search.distances += select(next.is_vertex, vertices, 1u32) * faces;
             let slope =
                 Slope { s: here.gradient.dot(part.b - part.a), t: here.gradient.dot(part.c - part.a) };
             let iterate = Iterate { at: next.at, slope };
@@ -419,7 +401,7 @@ pub fn minimize(
 }
 
 #[cube]
-pub fn no_best(#[comptime] variant: Variant) -> Best {
+fn no_best(#[comptime] variant: Variant) -> Best {
     let held = comptime!(2 * (LANES / variant.lanes) as usize);
     Best { rows: Shared::<[Row]>::new_slice(held), words: Shared::<[u32]>::new_slice(held) }
 }

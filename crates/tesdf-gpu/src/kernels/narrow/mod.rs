@@ -12,6 +12,5 @@ pub mod piece;
 pub mod polygon_distance;
 pub mod sorted;
 pub mod taken;
-pub mod whole_faces;
 pub mod work;
 pub mod world;

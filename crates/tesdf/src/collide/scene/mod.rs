@@ -277,7 +277,7 @@ impl Scene {
 
     /// Marks these instances, and no others, as still. Two still instances never meet: nothing is
     /// detected between bodies that do not move, whose contacts the caller knows. The mark has no
-    /// effect on the detection of `tesdf-gpu`, nor on queries of a given pair.
+    /// effect on queries of a given pair.
     pub fn set_still(&mut self, ids: impl IntoIterator<Item = InstanceId>) {
         self.still.clear();
         self.still.extend(ids);

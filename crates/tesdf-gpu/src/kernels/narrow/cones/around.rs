@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 use tesdf::collide::internal::limits;
 
 use super::super::super::field::shapes::{
-    BOX, FACE_VERTICES, FANS, Field, FieldExpand, KIND, MESH, NONE, PLANE, SIZES,
+    BOX, FACE_VERTICES, FANS, Fans, Field, FieldExpand, KIND, MESH, NONE, PLANE, SIZES,
 };
 use super::super::super::math::triangle::{Face, FaceExpand};
 use super::super::super::math::vector::{V3, from_bits, v3};
@@ -39,7 +39,7 @@ pub struct Place {
 struct Fan {
     first: u32,
     end: u32,
-    /// The distance of [`FANS`].
+    /// The distance of [`Fans::words`].
     clear: f32,
 }
 
@@ -92,7 +92,7 @@ impl Found {
 impl Field<'_> {
     /// Collects the different outward normals of the faces around a place as the rays of a cone: none
     /// at rounded shapes, at surfaces that do not enclose a solid, and where the surface is concave.
-    pub fn normals(self, place: Place, cones: &mut Cones, cone: u32) {
+    pub fn normals(self, fans: &Fans, place: Place, cones: &mut Cones, cone: u32) {
         let kind = self.entry(KIND);
         if kind == PLANE {
             cones.add(cone, v3(0.0f32, 0.0f32, 1.0f32));
@@ -106,9 +106,9 @@ impl Field<'_> {
             found.add(place.face);
             let first = self.face(place.face);
             if first.within_sides(place.at) <= place.limit {
-                let is_known = self.known_around(place, first, &mut found, cones, cone);
+                let is_known = self.known_around(fans, place, first, &mut found, cones, cone);
                 if !is_known {
-                    self.search(place, &mut found);
+                    self.search(fans, place, &mut found);
                 }
             }
             if found.count <= MOST_FACES {
@@ -144,15 +144,16 @@ impl Field<'_> {
         self.word(self.entry(FACE_VERTICES) + 3u32 * face + k)
     }
 
-    fn fan(self, vertex: u32) -> Fan {
+    fn fan(self, fans: &Fans, vertex: u32) -> Fan {
         let at = self.entry(FANS) + 2u32 * vertex;
-        Fan { first: self.word(at), end: self.word(at + 2u32), clear: from_bits(self.word(at + 1u32)) }
+        Fan { first: fans.word(at), end: fans.word(at + 2u32), clear: from_bits(fans.word(at + 1u32)) }
     }
 
     /// Collects the normals at a vertex with clear surroundings, which leaves no faces, or the faces at
     /// a side. Returns whether the place is there.
     fn known_around(
         self,
+        fans: &Fans,
         place: Place,
         first: Face,
         found: &mut Found,
@@ -166,7 +167,7 @@ impl Field<'_> {
         let mut is_beside = true;
         let mut k = 0u32;
         while k < 3u32 {
-            let clear = self.fan(self.vertex(place.face, k)).clear;
+            let clear = self.fan(fans, self.vertex(place.face, k)).clear;
             let way = (first.corner(k) - place.at).length();
             if corner == 3u32 && way <= place.limit {
                 corner = k;
@@ -180,13 +181,13 @@ impl Field<'_> {
         }
         let mut is_known = false;
         if corner < 3u32 {
-            let fan = self.fan(self.vertex(place.face, corner));
+            let fan = self.fan(fans, self.vertex(place.face, corner));
             is_known = fan.clear.abs() > CLEAR * place.limit;
             if is_known {
                 found.count = 0u32;
                 let mut i = fan.first;
                 while i < fan.end {
-                    cones.add(cone, self.face(self.word(i)).normal);
+                    cones.add(cone, self.face(fans.word(i)).normal);
                     i += 1u32;
                 }
                 if fan.clear < 0.0f32 && cones.count(cone) > 1u32 {
@@ -194,7 +195,7 @@ impl Field<'_> {
                 }
             }
         } else if is_beside && sides == 1u32 {
-            let other = self.beside(place.face, side);
+            let other = self.beside(fans, place.face, side);
             is_known = other != NONE;
             if is_known {
                 found.add(other);
@@ -204,14 +205,14 @@ impl Field<'_> {
     }
 
     /// The other face that has a side of a face; none where there is not exactly one.
-    fn beside(self, face: u32, side: u32) -> u32 {
-        let fan = self.fan(self.vertex(face, side));
+    fn beside(self, fans: &Fans, face: u32, side: u32) -> u32 {
+        let fan = self.fan(fans, self.vertex(face, side));
         let end = self.vertex(face, (side + 1u32) % 3u32);
         let mut found = NONE.runtime();
         let mut is_one = true;
         let mut i = fan.first;
         while i < fan.end {
-            let other = self.word(i);
+            let other = fans.word(i);
             let has_side = self.vertex(other, 0u32) == end
                 || self.vertex(other, 1u32) == end
                 || self.vertex(other, 2u32) == end;
@@ -226,13 +227,13 @@ impl Field<'_> {
     }
 
     /// Adds the faces that have vertices in common, up to one more than [`MOST_FACES`].
-    fn search(self, place: Place, found: &mut Found) {
+    fn search(self, fans: &Fans, place: Place, found: &mut Found) {
         let mut next = 0u32;
         while next < 3u32 * found.count && found.count <= MOST_FACES {
-            let fan = self.fan(self.vertex(found.faces[(next / 3u32) as usize], next % 3u32));
+            let fan = self.fan(fans, self.vertex(found.faces[(next / 3u32) as usize], next % 3u32));
             let mut i = fan.first;
             while i < fan.end && found.count <= MOST_FACES {
-                let other = self.word(i);
+                let other = fans.word(i);
                 if !found.has(other) && self.face(other).distance(place.at) <= place.limit {
                     found.add(other);
                 }

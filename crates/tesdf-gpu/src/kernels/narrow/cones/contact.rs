@@ -4,7 +4,7 @@ use tesdf::collide::internal;
 
 use super::super::super::broad::ordered_pair::{OrderedPair, OrderedPairExpand, OrderedPairs};
 use super::super::super::counters::{CONTACTS, Counters};
-use super::super::super::field::shapes::{DIAGONAL, Field, KIND, ROUND, SIZES, Shapes};
+use super::super::super::field::shapes::{DIAGONAL, Fans, Field, KIND, ROUND, SIZES, Shapes};
 use super::super::super::math::vector::{V3, pick};
 use super::super::contacts::{Contacts, ContactsExpand};
 use super::around::Place;
@@ -85,7 +85,7 @@ impl OrderedPair {
 #[cube]
 impl Contact {
     /// The cones of both bodies. That of *b* is empty where that of *a* is.
-    fn cones(self, shapes: &Shapes, pair: OrderedPair, lengths: Lengths, cones: &mut Cones) {
+    fn cones(self, shapes: &Shapes, fans: &Fans, pair: OrderedPair, lengths: Lengths, cones: &mut Cones) {
         // Inside of b, the faces of one place are equally near. Outside, they have the nearest point.
         let is_apart = self.distance > lengths.near;
         let in_field = pick(is_apart, self.point_b, self.point_a);
@@ -99,7 +99,7 @@ impl Contact {
                 limit: select(is_b, deep, lengths.near / pair.scale),
                 face: select(is_b, self.face_b, self.face_a),
             };
-            shapes.field(select(is_b, pair.shape_b, pair.shape_a)).normals(place, cones, cone);
+            shapes.field(select(is_b, pair.shape_b, pair.shape_a)).normals(fans, place, cones, cone);
             cone += 1u32;
             if !is_b {
                 let mut i = 0u32;
@@ -170,6 +170,7 @@ impl Contact {
 #[cube(launch, create_dummy_kernel)]
 pub fn in_cones(
     shapes: &Shapes,
+    fans: &Fans,
     pairs: &OrderedPairs,
     tolerances: &[f32],
     counters: &Counters,
@@ -183,7 +184,7 @@ pub fn in_cones(
         let contact = contacts.contact(number);
         let lengths = pair.lengths(a, b, tolerances[pair.b as usize]);
         let mut cones = no_cones();
-        contact.cones(shapes, pair, lengths, &mut cones);
+        contact.cones(shapes, fans, pair, lengths, &mut cones);
         let mut found = contact.of_cones(&cones, lengths);
         if b.entry(KIND) == ROUND {
             found = contact.of_round(&cones, lengths, b.vector(SIZES).y);
