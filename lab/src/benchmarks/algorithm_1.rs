@@ -42,7 +42,7 @@ enum DomainName {
     Bisection,
 }
 
-/// Number of operations of one distance in `kernels/encode/sample.rs` of `tesdf-gpu`. Each sum and
+/// Number of operations of one distance in `kernels/encode/sampled.rs` of `tesdf-gpu`. Each sum and
 /// each product counts as one: 6 for each of four heights over planes, 8 for each of three foot
 /// points on edges, 13 for each of three distances to edges, and 9 comparisons and selections.
 const OPERATIONS: f64 = 96.0;

@@ -2,7 +2,7 @@
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use tesdf::collide::{CollideOptions, Scene};
-use tesdf_gpu::GivenPoses;
+use tesdf_gpu::PoseArrays;
 
 use super::array::{DeviceArray, Words};
 use super::foreign::{Named, RowsThere, rows_there};
@@ -48,7 +48,7 @@ pub fn detect_on_device<'py>(
     let given = match (&poses, &velocities) {
         (Some(poses), velocities) => {
             let velocities = velocities.as_ref().map(|rows| &rows.array);
-            Some(GivenPoses { poses: &poses.array, velocities })
+            Some(PoseArrays { poses: &poses.array, velocities })
         }
         (None, Some(_)) => {
             return Err(argument("velocities", "an array without poses", "both, or poses alone"));

@@ -5,15 +5,17 @@ use super::Capacities;
 use super::counts::Counts;
 use crate::GpuError;
 use crate::device::{Buffer, Device};
-use crate::kernels::broad::meshlets::{BlocksLaunch, WORDS as BLOCK_WORDS};
-use crate::kernels::broad::ordered_pair::{OrderedPairsLaunch, ROWS as PAIR_ROWS, WORDS as PAIR_WORDS};
-use crate::kernels::broad::pairs::FoundLaunch;
-use crate::kernels::middle::items::{
+use crate::kernels::detect::candidates::{
     ItemsLaunch, PolygonsLaunch, ROWS as POLYGON_ROWS, WHOLE, WORDS as ITEM_WORDS,
 };
-use crate::kernels::narrow::contacts::{ContactsLaunch, ROWS as CONTACT_ROWS, WORDS as CONTACT_WORDS};
-use crate::kernels::reduce::members::{MembersLaunch, ROWS as MEMBER_ROWS, TOUCHING_WORDS, TouchingLaunch};
-use crate::kernels::reduce::reduce::REPORT_ROWS;
+use crate::kernels::detect::ordered_pair::{OrderedPairsLaunch, ROWS as PAIR_ROWS, WORDS as PAIR_WORDS};
+use crate::kernels::pairs::instance_pairs::FoundLaunch;
+use crate::kernels::pairs::meshlets::{BlocksLaunch, WORDS as BLOCK_WORDS};
+use crate::kernels::report::contact::{ContactsLaunch, ROWS as CONTACT_ROWS, WORDS as CONTACT_WORDS};
+use crate::kernels::report::reduce::members::{
+    MembersLaunch, ROWS as MEMBER_ROWS, TOUCHING_WORDS, TouchingLaunch,
+};
+use crate::kernels::report::reduce::selection::REPORT_ROWS;
 
 /// Size of a word and of a row of four `f32`, in bytes.
 pub const WORD: usize = 4;

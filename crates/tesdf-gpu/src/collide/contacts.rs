@@ -9,10 +9,10 @@ use tesdf::collide::{
 };
 
 use super::scene::instances::Instances;
-use crate::kernels::field::shapes::NONE;
-use crate::kernels::narrow::contacts::{CONVERGED, NO_CORNER, ROWS, WORDS};
-use crate::kernels::reduce::members::TOUCHING_WORDS;
-use crate::kernels::reduce::reduce::REPORT_ROWS;
+use crate::kernels::report::contact::{CONVERGED, NO_CORNER, ROWS, WORDS};
+use crate::kernels::report::reduce::members::TOUCHING_WORDS;
+use crate::kernels::report::reduce::selection::REPORT_ROWS;
+use crate::kernels::scene::shape::NONE;
 
 /// The words of a contact, in the layout that kernels write.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -3,7 +3,7 @@ use tesdf::collide::HiddenOverlap;
 
 use crate::GpuError;
 use crate::device::{Device, DeviceArray};
-use crate::kernels::narrow::world::WorldContactsLaunch;
+use crate::kernels::report::world_contacts::WorldContactsLaunch;
 
 /// Contacts on the device, in the world's frame and unit, in the order of
 /// [`detect`](super::Detector::detect) by world, pair of instances, and order of the pair. Faces
@@ -17,9 +17,9 @@ pub struct DeviceContacts {
     /// `[N, 3]`: the points of the second instance's surface that are closest to these.
     pub points_b: DeviceArray<f32>,
     /// `[N, 3]`: unit normals, from the second instance to the first: those that
-    /// [`detect`](super::Detector::detect) gives. A contact of faces has one that both bodies allow;
-    /// the others, and those of bodies whose vertices have moved, have the gradient of the signed
-    /// distance of the second instance.
+    /// [`detect`](super::Detector::detect) gives. A contact of faces has one that both bodies
+    /// allow; the others, and those of bodies whose vertices have moved, have the gradient of the
+    /// signed distance of the second instance.
     pub normals: DeviceArray<f32>,
     /// `[N]`: signed distances.
     pub distances: DeviceArray<f32>,

@@ -1,18 +1,17 @@
 //! Finds all contacts of a scene in one pass. A pass has the same number of launches for one pair
 //! of bodies as for thousands of worlds.
-mod broad;
+mod bodies;
 mod buffers;
 mod contacts;
 mod counts;
 mod device_contacts;
-mod given_poses;
-mod middle;
 mod narrow;
 mod on_device;
 mod on_processor;
 mod options;
+mod pairs;
 mod pass;
-pub mod queries;
+mod pose_arrays;
 mod reduce;
 pub mod scene;
 mod shared;
@@ -31,12 +30,12 @@ use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
 use contacts::{Row, Words, contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
 pub use device_contacts::DeviceContacts;
-pub use given_poses::GivenPoses;
 use on_processor::{finds_all, is_detected, pairs_on_processor, with_pairs};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
 use pass::{Normals, Parts, parts};
+pub use pose_arrays::PoseArrays;
 use scene::instances::Instances;
 use scene::placed::{FieldFrame, Placed};
 use scene::{GpuShapeId, GpuShapes};
@@ -45,8 +44,8 @@ use stages::Timing;
 
 use crate::GpuError;
 use crate::device::{Buffer, Device, DeviceArray};
-use crate::kernels::broad::ordered_pair::WORDS as PAIR_WORDS;
-use crate::kernels::broad::pairs::{BOUNDS_ROWS, INSTANCE_ROWS, INSTANCE_WORDS};
+use crate::kernels::detect::ordered_pair::WORDS as PAIR_WORDS;
+use crate::kernels::pairs::instance_pairs::{BOUNDS_ROWS, INSTANCE_ROWS, INSTANCE_WORDS};
 
 /// Finds the contacts of a scene on a device. It keeps shapes and buffers on the device from one
 /// detection to the next.
@@ -250,7 +249,7 @@ impl Detector {
     fn passes(
         &mut self,
         scene: &Scene,
-        given: Option<&GivenPoses<'_>>,
+        given: Option<&PoseArrays<'_>>,
         options: &CollideOptions,
         normals: Normals,
         timing: Timing,

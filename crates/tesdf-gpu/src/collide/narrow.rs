@@ -6,15 +6,15 @@ use super::stages::launch;
 use super::{Counting, Exchange, Lanes};
 use crate::GpuError;
 use crate::device::Buffer;
+use crate::kernels::cones::contact;
 use crate::kernels::counters::{CONTACTS, POLYGONS};
-use crate::kernels::narrow::cones::contact;
 use crate::kernels::narrow::exact::AskedExactLaunch;
 use crate::kernels::narrow::exchange::{LANES, Variant};
-use crate::kernels::narrow::faces::AskedLaunch;
-use crate::kernels::narrow::{exact, exact_faces, faces, nodes};
+use crate::kernels::narrow::frank_wolfe::AskedLaunch;
+use crate::kernels::narrow::{exact, exact_faces, frank_wolfe, nodes};
 
 impl Pass<'_> {
-    pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
+    pub(super) fn narrow(&self) -> Result<(), GpuError> {
         match self.options.mode {
             Mode::Node => self.narrow_nodes(),
             Mode::Face { iterations, .. } => self.narrow_faces(iterations),
@@ -23,32 +23,30 @@ impl Pass<'_> {
     }
 
     /// Gives contacts of faces the normals that both bodies allow.
-    pub(super) fn in_cones(&mut self) -> Result<(), GpuError> {
-        let per_contact = self.groups_for(self.detector.buffers.room.contacts, GROUP, CONTACTS)?;
-        let tolerances = self.tolerances()?;
-        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+    pub(super) fn in_cones(&self) -> Result<(), GpuError> {
+        let buffers = self.buffers();
+        let per_contact = self.groups_for(buffers.room.contacts, GROUP, CONTACTS)?;
+        let (tolerances, fans) = (self.tolerances()?, self.detector.shapes.fans());
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
-        let fans = shapes.fans();
         launch!(
             self.stages,
             "normals",
             per_contact,
             GROUP,
-            contact::in_cones(shapes.argument(), fans, pairs, tolerances.words(), counters, contacts)
+            contact::in_cones(self.shapes(), fans, pairs, tolerances.words(), counters, contacts)
         )
     }
 
-    fn narrow_nodes(&mut self) -> Result<(), GpuError> {
-        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+    fn narrow_nodes(&self) -> Result<(), GpuError> {
+        let buffers = self.buffers();
         let per_node = self.groups_for(buffers.room.polygons, GROUP, POLYGONS)?;
         let (pairs, items, contacts) = (buffers.ordered_pairs(), buffers.items(), buffers.contacts());
-        let counters = self.counters();
         launch!(
             self.stages,
             "node narrow phase",
             per_node,
             GROUP,
-            nodes::narrow_nodes(shapes.argument(), pairs, items, counters, contacts)
+            nodes::narrow_nodes(self.shapes(), pairs, items, self.counters(), contacts)
         )
     }
 
@@ -63,18 +61,17 @@ impl Pass<'_> {
     }
 
     /// The tolerances of all instances on the device, which are uploaded once for a pass.
-    fn tolerances(&mut self) -> Result<Buffer, GpuError> {
-        if let Some(uploaded) = &self.tolerances {
+    fn tolerances(&self) -> Result<Buffer, GpuError> {
+        if let Some(uploaded) = self.tolerances.get() {
             return Ok(uploaded.clone());
         }
         let tolerances = self.detector.tolerances(self.instances, self.face_options().tolerance);
-        let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
-        self.sent += tolerances.bytes();
-        Ok(self.tolerances.insert(tolerances).clone())
+        let uploaded = self.upload("tolerances", &tolerances)?;
+        Ok(self.tolerances.get_or_init(|| uploaded).clone())
     }
 
-    fn narrow_faces(&mut self, iterations: u32) -> Result<(), GpuError> {
-        let (shapes, buffers, with) = (&self.detector.shapes, &self.detector.buffers, &self.detector.options);
+    fn narrow_faces(&self, iterations: u32) -> Result<(), GpuError> {
+        let (buffers, with) = (self.buffers(), &self.detector.options);
         let (per, lanes) = match with.lanes {
             Lanes::Single => (LANES, 1),
             Lanes::Group => (1, LANES),
@@ -85,23 +82,23 @@ impl Pass<'_> {
             counting: with.counting == Counting::Operations,
         };
         let per_polygon = self.groups_for(buffers.room.polygons, per, POLYGONS)?;
-        let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
+        let (pairs, polygons, contacts) = (buffers.ordered_pairs(), buffers.polygons(), buffers.contacts());
         let asked = AskedLaunch::new(iterations, self.cos_theta());
-        let polygons = buffers.polygons();
+        let counters = self.counters();
         launch!(
             self.stages,
             "face narrow phase",
             per_polygon,
             LANES,
-            faces::narrow_faces(shapes.argument(), pairs, polygons, counters, contacts, asked, variant)
+            frank_wolfe::narrow_faces(self.shapes(), pairs, polygons, counters, contacts, asked, variant)
         )
     }
 
-    fn narrow_exact(&mut self) -> Result<(), GpuError> {
-        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+    fn narrow_exact(&self) -> Result<(), GpuError> {
+        let (buffers, shapes, counters) = (self.buffers(), self.shapes(), self.counters());
         let per_polygon = self.groups_for(buffers.room.polygons, 1, POLYGONS)?;
         let tolerances = self.tolerances()?;
-        let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
+        let (pairs, contacts) = (buffers.ordered_pairs(), buffers.contacts());
         let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
         let counting = self.detector.options.counting == Counting::Operations;
         if parts(self.options) == Parts::Faces {
@@ -111,15 +108,7 @@ impl Pass<'_> {
                 "exact narrow phase",
                 per_polygon,
                 LANES,
-                exact_faces::narrow_exact_faces(
-                    shapes.argument(),
-                    pairs,
-                    faces,
-                    counters,
-                    contacts,
-                    asked,
-                    counting
-                )
+                exact_faces::narrow_exact_faces(shapes, pairs, faces, counters, contacts, asked, counting)
             );
         }
         let polygons = buffers.polygons();
@@ -128,7 +117,7 @@ impl Pass<'_> {
             "exact narrow phase",
             per_polygon,
             LANES,
-            exact::narrow_exact(shapes.argument(), pairs, polygons, counters, contacts, asked, counting)
+            exact::narrow_exact(shapes, pairs, polygons, counters, contacts, asked, counting)
         )
     }
 }

@@ -1,34 +1,33 @@
-//! Contacts that stay on the device, for a physics engine on the same device. Poses may come from an
-//! array there, too.
+//! Contacts that stay on the device, for a physics engine on the same device. Poses may come from
+//! an array there, too.
 use tesdf::collide::internal::Ahead;
 use tesdf::collide::{CollideError, CollideOptions, HiddenOverlap, InstanceId, Reduction, Scene, Shape};
 
 use super::contacts::contacts;
 use super::device_contacts::DeviceContacts;
-use super::given_poses::GivenPoses;
 use super::on_processor::{finds_all, has_undetected, with_pairs_on_device};
 use super::pass::{GROUP, Normals, Parts, Pass, parts};
+use super::pose_arrays::PoseArrays;
 use super::scene::instances::Instances;
 use super::scene::placed::Placed;
 use super::stages::{Stages, Timing, launch};
 use super::{Detector, DeviceReport, possible, wants_minima};
 use crate::GpuError;
 use crate::device::{Buffer, spread};
-use crate::kernels::broad::place::{self, GivenLaunch};
-use crate::kernels::field::nearest::FAR;
-use crate::kernels::narrow::sorted;
-use crate::kernels::narrow::world;
+use crate::kernels::query::nearest::FAR;
+use crate::kernels::report::order;
+use crate::kernels::report::world_contacts;
+use crate::kernels::scene::pose_arrays::{self, PoseArraysLaunch};
 
 impl Pass<'_> {
     /// Writes the poses and motions of all instances from the arrays.
-    pub(super) fn place(&mut self, given: &GivenPoses<'_>) -> Result<(), GpuError> {
-        let (device, all) = (&self.detector.device, self.instances);
-        let fixed = device.upload("frames of instances", &all.fixed)?;
-        let rows = device.upload("rows of instances", &all.ranks())?;
-        self.sent += fixed.bytes() + rows.bytes();
+    pub(super) fn place(&self, given: &PoseArrays<'_>) -> Result<(), GpuError> {
+        let all = self.instances;
+        let fixed = self.upload("frames of instances", &all.fixed)?;
+        let rows = self.upload("rows of instances", &all.ranks())?;
         let count = all.ids.len() as u32;
         let velocities = given.velocities.unwrap_or(given.poses);
-        let argument = GivenLaunch::new(
+        let argument = PoseArraysLaunch::new(
             given.poses.buffer().words(),
             velocities.buffer().words(),
             fixed.rows(),
@@ -37,18 +36,17 @@ impl Pass<'_> {
             u32::from(given.velocities.is_some()),
             self.options.speculative_time as f32,
         );
-        let (counters, placed) = (self.counters(), self.placed.clone());
         launch!(
             self.stages,
             "poses",
             spread(count.div_ceil(GROUP)),
             GROUP,
-            place::place(argument, counters, placed.rows())
+            pose_arrays::place(argument, self.counters(), self.placed.rows())
         )
     }
 }
 
-/// [`FIXED_ROWS`](place::FIXED_ROWS) rows for each instance: what its motion does not change.
+/// [`FIXED_ROWS`](pose_arrays::FIXED_ROWS) rows for each instance: what its motion does not change.
 ///
 /// # Errors
 /// An instance is missing.
@@ -84,7 +82,7 @@ impl Detector {
     pub fn detect_on_device(
         &mut self,
         scene: &Scene,
-        given: Option<&GivenPoses<'_>>,
+        given: Option<&PoseArrays<'_>>,
         options: &CollideOptions,
     ) -> Result<DeviceContacts, GpuError> {
         let options = &possible(options)?;
@@ -131,7 +129,7 @@ impl Detector {
     fn leave(
         &mut self,
         scene: &Scene,
-        given: Option<&GivenPoses<'_>>,
+        given: Option<&PoseArrays<'_>>,
         options: &CollideOptions,
     ) -> Result<DeviceContacts, GpuError> {
         let normals = if self.has_cones(options) { Normals::InCones } else { Normals::Gradients };
@@ -171,12 +169,12 @@ impl Detector {
         let mut order = device.empty("order of contacts", bytes)?;
         let mut merged = device.empty("merged order of contacts", bytes)?;
         let groups = || spread(count.div_ceil(GROUP));
-        let mut stages = Stages::new(&device, Timing::Off);
-        launch!(stages, "order", groups(), GROUP, sorted::begin(order.words(), count))?;
+        let stages = Stages::new(&device, Timing::Off);
+        launch!(stages, "order", groups(), GROUP, order::begin(order.words(), count))?;
         let mut run = 1u32;
         while run < count {
             let (from, to) = (order.words(), merged.words());
-            launch!(stages, "order", groups(), GROUP, sorted::merge(contacts(), from, to, count, run))?;
+            launch!(stages, "order", groups(), GROUP, order::merge(contacts(), from, to, count, run))?;
             std::mem::swap(&mut order, &mut merged);
             run = run.saturating_mul(2);
         }
@@ -186,9 +184,9 @@ impl Detector {
             "contacts in the world",
             groups(),
             GROUP,
-            world::to_world(contacts(), order.words(), poses, ids, out, count)
+            world_contacts::to_world(contacts(), order.words(), poses, ids, out, count)
         )?;
-        self.report.launches += stages.launches;
+        self.report.launches += stages.launches.get();
         Ok(found)
     }
 }

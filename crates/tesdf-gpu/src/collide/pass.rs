@@ -1,18 +1,22 @@
 //! One pass: the launches of all stages.
+use std::cell::{Cell, OnceCell};
+
+use bytemuck::NoUninit;
 use cubecl::prelude::*;
 use tesdf::collide::{CollideOptions, ContactsPer};
 
-use super::buffers::{ROW, WORD};
+use super::buffers::{PipelineBuffers, ROW, WORD};
 use super::counts::Counts;
-use super::given_poses::GivenPoses;
+use super::pose_arrays::PoseArrays;
 use super::scene::instances::Instances;
 use super::stages::{Stages, Timing, launch};
 use super::{Detector, Pruning};
 use crate::GpuError;
 use crate::device::Buffer;
-use crate::kernels::broad::pairs::INSTANCE_ROWS;
+use crate::kernels::bodies::clip;
 use crate::kernels::counters::{self, COUNTERS, CountersLaunch};
-use crate::kernels::middle::clip;
+use crate::kernels::pairs::instance_pairs::INSTANCE_ROWS;
+use crate::kernels::scene::shape::ShapesLaunch;
 
 pub use crate::kernels::GROUP;
 
@@ -56,9 +60,9 @@ pub struct Pass<'a> {
     /// Poses and motions of the instances.
     pub placed: Buffer,
     /// Tolerances of the instances, once a stage has needed them.
-    pub tolerances: Option<Buffer>,
+    pub tolerances: OnceCell<Buffer>,
     /// Bytes that were sent to the device.
-    pub sent: usize,
+    sent: Cell<usize>,
 }
 
 impl Detector {
@@ -67,7 +71,7 @@ impl Detector {
     pub(super) fn pass(
         &mut self,
         instances: &Instances,
-        given: Option<&GivenPoses<'_>>,
+        given: Option<&PoseArrays<'_>>,
         options: &CollideOptions,
         normals: Normals,
         timing: Timing,
@@ -84,33 +88,34 @@ impl Detector {
             None => device.upload("instances", &instances.rows)?,
             Some(_) => device.empty("instances", instances.ids.len() * INSTANCE_ROWS as usize * ROW)?,
         };
-        let mut pass = Pass {
+        let sent = counters.bytes() + if given.is_some() { 0 } else { placed.bytes() };
+        let pass = Pass {
             detector: self,
             options,
             instances,
-            sent: counters.bytes() + if given.is_some() { 0 } else { placed.bytes() },
+            sent: Cell::new(sent),
             counters: counters.clone(),
             placed: placed.clone(),
-            tolerances: None,
+            tolerances: OnceCell::new(),
             stages: Stages::new(&device, timing),
         };
         if let Some(given) = given {
             pass.place(given)?;
         }
-        pass.broad()?;
+        pass.pairs()?;
         let slabs = pass.slabs();
         let per_meshlet =
             pass.groups_in_slabs(pass.detector.buffers.room.meshlets, 1, slabs, counters::MESHLETS)?;
-        pass.middle(&per_meshlet)?;
+        pass.bodies(&per_meshlet)?;
         pass.narrow()?;
         if normals == Normals::InCones {
             pass.in_cones()?;
         }
         pass.reduce()?;
         let Pass { sent, stages: Stages { launches, times, .. }, .. } = pass;
-        self.report.sent += sent;
-        self.report.launches = launches;
-        self.report.stages = times;
+        self.report.sent += sent.into_inner();
+        self.report.launches = launches.into_inner();
+        self.report.stages = times.into_inner();
         let counts = Counts::read(&device, &counters)?;
         self.report.read += COUNTERS * WORD;
         self.check(&counts)?;
@@ -142,6 +147,21 @@ impl Detector {
 }
 
 impl Pass<'_> {
+    /// Uploads data of this pass.
+    pub fn upload<T: NoUninit>(&self, name: &'static str, data: &[T]) -> Result<Buffer, GpuError> {
+        let buffer = self.detector.device.upload(name, data)?;
+        self.sent.set(self.sent.get() + buffer.bytes());
+        Ok(buffer)
+    }
+
+    pub fn shapes(&self) -> ShapesLaunch {
+        self.detector.shapes.argument()
+    }
+
+    pub fn buffers(&self) -> &PipelineBuffers {
+        &self.detector.buffers
+    }
+
     pub fn counters(&self) -> CountersLaunch {
         CountersLaunch::new(self.counters.words())
     }
@@ -149,33 +169,26 @@ impl Pass<'_> {
     /// Number of groups for the next launch, with `per` elements per group. The device computes it
     /// from the elements that `counter` has counted, but at most `room`, the capacity of the
     /// buffer: see [`groups_for`](counters::groups_for).
-    pub fn groups_for(&mut self, room: u32, per: u32, counter: u32) -> Result<CubeCount, GpuError> {
+    pub fn groups_for(&self, room: u32, per: u32, counter: u32) -> Result<CubeCount, GpuError> {
         self.groups_in_slabs(room, per, 1, counter)
     }
 
-    /// The same groups `slabs` times in z. A stage that takes its element from the position among all
-    /// groups finds elements in the first slab alone.
-    fn groups_in_slabs(
-        &mut self,
-        room: u32,
-        per: u32,
-        slabs: u32,
-        counter: u32,
-    ) -> Result<CubeCount, GpuError> {
-        let groups = self.detector.buffers.groups.clone();
-        let counters = self.counters();
-        let one = CubeCount::Static(1, 1, 1);
+    /// The same groups `slabs` times in z. A stage that takes its element from the position among
+    /// all groups finds elements in the first slab alone.
+    fn groups_in_slabs(&self, room: u32, per: u32, slabs: u32, counter: u32) -> Result<CubeCount, GpuError> {
+        let groups = &self.buffers().groups;
         launch!(
             self.stages,
             "groups",
-            one,
+            CubeCount::Static(1, 1, 1),
             1,
-            counters::groups_for(counters, groups.words(), room, per, slabs, counter)
+            counters::groups_for(self.counters(), groups.words(), room, per, slabs, counter)
         )?;
         Ok(groups.count())
     }
 
-    /// Groups of threads per meshlet. With many bodies there are enough meshlets to occupy the device.
+    /// Groups of threads per meshlet. With many bodies there are enough meshlets to occupy the
+    /// device.
     fn slabs(&self) -> u32 {
         let few = self.instances.ids.len() <= FEW_INSTANCES;
         if few && parts(self.options) == Parts::Polygons { clip::GROUPS_PER_MESHLET } else { 1 }

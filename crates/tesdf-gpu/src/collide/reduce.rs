@@ -9,13 +9,13 @@ use super::stages::launch;
 use crate::GpuError;
 use crate::device::spread;
 use crate::kernels::counters;
-use crate::kernels::reduce::{choice, members, reduce};
+use crate::kernels::report::reduce::{choice, members, selection};
 
 impl Pass<'_> {
     /// Reduces the contacts of each pair, when the options ask for it. The launches are: count,
     /// allot, fill, reduce.
-    pub(super) fn reduce(&mut self) -> Result<(), GpuError> {
-        let buffers = &self.detector.buffers;
+    pub(super) fn reduce(&self) -> Result<(), GpuError> {
+        let buffers = self.buffers();
         let (Reduction::PerPair(per_pair), Some(own)) = (self.options.reduction, &buffers.members) else {
             return Ok(());
         };
@@ -29,30 +29,27 @@ impl Pass<'_> {
             members::clear(own.tallies.words(), pairs)
         )?;
         let per_contact = self.groups_for(buffers.room.contacts, members::GROUP, counters::CONTACTS)?;
-        let counters = self.counters();
         launch!(
             self.stages,
             "members counted",
             per_contact.clone(),
             members::GROUP,
-            members::count(buffers.contacts(), counters, own.tallies.words())
+            members::count(buffers.contacts(), self.counters(), own.tallies.words())
         )?;
-        let counters = self.counters();
+        let (ordered, tallies) = (|| buffers.ordered_pairs(), || own.tallies.words());
         launch!(
             self.stages,
             "members allotted",
             per_pair_of_instances,
             members::GROUP,
-            members::allot(buffers.ordered_pairs(), counters, own.tallies.words(), own.touching())
+            members::allot(ordered(), self.counters(), tallies(), own.touching())
         )?;
-        let counters = self.counters();
-        let (pairs_launch, contacts) = (buffers.ordered_pairs(), buffers.contacts());
         launch!(
             self.stages,
             "members",
             per_contact,
             members::GROUP,
-            members::fill(pairs_launch, contacts, counters, own.tallies.words(), own.members())
+            members::fill(ordered(), buffers.contacts(), self.counters(), tallies(), own.members())
         )?;
         let per_touching = self.groups_for(pairs, 1, counters::TOUCHING)?;
         let (contacts, counters) = (buffers.contacts(), self.counters());
@@ -62,7 +59,7 @@ impl Pass<'_> {
             "reduction",
             per_touching,
             choice::GROUP,
-            reduce::reduce(contacts, counters, touching, own.members(), reports, own.kept(), per_pair)
+            selection::reduce(contacts, counters, touching, own.members(), reports, own.kept(), per_pair)
         )
     }
 }

@@ -3,7 +3,7 @@ use std::sync::{Mutex, PoisonError};
 
 use tesdf::collide::{CollideOptions, Contacts, Scene};
 
-use super::{Detector, DetectorOptions, DeviceContacts, GivenPoses};
+use super::{Detector, DetectorOptions, DeviceContacts, PoseArrays};
 use crate::GpuError;
 use crate::device::Device;
 
@@ -35,7 +35,7 @@ impl SharedDetector {
     pub fn detect_on_device(
         &self,
         scene: &Scene,
-        given: Option<&GivenPoses<'_>>,
+        given: Option<&PoseArrays<'_>>,
         options: &CollideOptions,
     ) -> Result<DeviceContacts, GpuError> {
         self.with(scene, |detector| detector.detect_on_device(scene, given, options))

@@ -1,4 +1,5 @@
 //! Counts and times launches.
+use std::cell::{Cell, RefCell};
 use std::time::Duration;
 
 use crate::GpuError;
@@ -15,22 +16,25 @@ pub enum Timing {
 pub struct Stages<'a> {
     pub device: &'a Device,
     timing: Timing,
-    pub launches: usize,
-    pub times: Vec<(&'static str, Duration)>,
+    pub launches: Cell<usize>,
+    pub times: RefCell<Vec<(&'static str, Duration)>>,
 }
 
 impl<'a> Stages<'a> {
     pub fn new(device: &'a Device, timing: Timing) -> Self {
-        Self { device, timing, launches: 0, times: Vec::new() }
+        Self { device, timing, launches: Cell::new(0), times: RefCell::default() }
     }
 
     /// Counts and times a launch. The macro `launch!` calls it.
-    pub fn run(&mut self, name: &'static str, launch: impl FnOnce(&Device)) -> Result<(), GpuError> {
-        self.launches += 1;
+    pub fn run(&self, name: &'static str, launch: impl FnOnce(&Device)) -> Result<(), GpuError> {
+        self.launches.set(self.launches.get() + 1);
         let device = self.device;
         match self.timing {
             Timing::Off => launch(device),
-            Timing::On => self.times.push((name, device.time(|| launch(device))?)),
+            Timing::On => {
+                let time = device.time(|| launch(device))?;
+                self.times.borrow_mut().push((name, time));
+            }
         }
         Ok(())
     }

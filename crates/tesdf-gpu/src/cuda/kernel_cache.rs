@@ -1,8 +1,8 @@
 //! Compiled kernels on disk, because NVRTC takes seconds for each.
 //!
-//! The folder is that of the environment variable `TESDF_KERNEL_CACHE`, otherwise `tesdf/kernels` in
-//! `XDG_CACHE_HOME`, `LOCALAPPDATA` or `HOME/.cache`. An empty variable switches the cache off. A
-//! folder that cannot be read or written only costs the time to compile.
+//! The folder is that of the environment variable `TESDF_KERNEL_CACHE`, otherwise `tesdf/kernels`
+//! in `XDG_CACHE_HOME`, `LOCALAPPDATA` or `HOME/.cache`. An empty variable switches the cache off.
+//! A folder that cannot be read or written only costs the time to compile.
 //!
 //! A file is named by a hash of all that decides its contents: text, architecture and compiler. It
 //! begins with a hash of the rest, so a damaged file is compiled anew.
@@ -32,8 +32,8 @@ pub fn image(source: &CudaSource, architecture: &str) -> Result<Vec<u8>, GpuErro
 /// As of [`compile`].
 pub fn compile_ahead(source: &CudaSource, architecture: &str) -> Result<Compiled, GpuError> {
     let compiled = compile(source, architecture)?;
-    // Machine code, in an ELF file of 64 bits, or PTX: an image of something else may refer to files
-    // of its own, as that of the stand-in of the tests does.
+    // Machine code, in an ELF file of 64 bits, or PTX: an image of something else may refer to
+    // files of its own, as that of the stand-in of the tests does.
     if (compiled.image.starts_with(b"\x7fELF\x02") || architecture.starts_with("compute_"))
         && let Some(file) = file(source, architecture)?
     {

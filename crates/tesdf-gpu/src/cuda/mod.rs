@@ -1,7 +1,7 @@
 //! The kernels as CUDA C++, for NVIDIA GPUs with CUDA, also where no graphics driver is installed.
 //!
-//! Tests compile each kernel with NVRTC, and run the generated code on the processor. An NVIDIA H100
-//! gave the same bytes.
+//! Tests compile each kernel with NVRTC, and run the generated code on the processor. An NVIDIA
+//! H100 gave the same bytes.
 //!
 //! # One way to launch
 //!

@@ -2,8 +2,8 @@ use bytemuck::{Pod, Zeroable};
 use tesdf::encode::{SampledCell, Sampling};
 use tesdf::glam::DVec3;
 
-use crate::kernels::encode::sample::{BLOCK, CELL_ROWS, INDEX, INDEX_BITS, block_limit, middle};
-use crate::kernels::math::vector::V3;
+use crate::kernels::encode::sampled::{BLOCK, CELL_ROWS, INDEX, INDEX_BITS, block_limit, middle};
+use crate::kernels::geometry::vector::V3;
 
 /// The sample grid of a cell, divided into blocks.
 pub struct Grid {

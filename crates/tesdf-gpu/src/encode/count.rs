@@ -8,7 +8,7 @@ use tesdf::encode::{EncodeError, SampledCell, Sampler, Sampling};
 
 use super::cell::{CellRows, Grid};
 use super::face::CandidateFace;
-use crate::kernels::encode::sample::{GROUP, TILE};
+use crate::kernels::encode::sampled::{GROUP, TILE};
 
 /// A [`Sampler`] that counts the distances which [`DeviceSampler`](super::DeviceSampler) would
 /// measure. It measures only a few of them, so its lists are not usable.

@@ -1,8 +1,8 @@
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
-use crate::kernels::encode::sample::{self, Candidate, Entry, FACE_ROWS};
-use crate::kernels::math::vector::V3;
+use crate::kernels::encode::sampled::{self, Candidate, Entry, FACE_ROWS};
+use crate::kernels::geometry::vector::V3;
 
 /// The part of a face's data that does not depend on the cell.
 pub struct CandidateFace {
@@ -58,7 +58,7 @@ impl CandidateFace {
         let [plane, side_0, side_1, side_2, begin_0, end_0, begin_1, end_1, begin_2, end_2] =
             self.rows(center).map(entry);
         let [edge_0, edge_1, edge_2] = [(begin_0, end_0), (begin_1, end_1), (begin_2, end_2)]
-            .map(|(begin, end)| sample::Edge { begin, end });
+            .map(|(begin, end)| sampled::Edge { begin, end });
         Candidate { plane, side_0, side_1, side_2, edge_0, edge_1, edge_2 }
     }
 }
@@ -68,7 +68,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kernels::encode::sample::ROUNDING;
+    use crate::kernels::encode::sampled::ROUNDING;
     use crate::testing::{degenerate, exact};
 
     /// Generates numbers from −1 to 1.

@@ -15,7 +15,7 @@ use face::CandidateFace;
 use crate::GpuError;
 use crate::device::Device;
 use crate::kernels::counters;
-use crate::kernels::encode::sample::{self as kernel, FACE_ROWS, GROUP, SamplesLaunch, sample};
+use crate::kernels::encode::sampled::{self as kernel, FACE_ROWS, GROUP, SamplesLaunch, sample};
 
 /// Rounding error that is allowed for the difference of two distances, relative to the sum of the
 /// cell's radius and the distance: section 3 of docs/math.md.

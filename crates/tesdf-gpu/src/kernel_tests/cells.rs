@@ -15,8 +15,8 @@ use tesdf::mesh::{SolidMesh, TriangleMesh};
 use super::{device, groups_of, read, upload};
 use crate::GpuShapes;
 use crate::kernels::GROUP;
-use crate::kernels::field::shapes::{NONE, Shapes};
-use crate::kernels::math::vector::{Row, xyz};
+use crate::kernels::geometry::vector::{Row, xyz};
+use crate::kernels::scene::shape::{NONE, Shapes};
 
 /// Finds the cell of a point per thread, in the first shape.
 #[cube(launch)]

@@ -6,8 +6,8 @@ use tesdf::glam::DVec3;
 
 use super::{device, groups_of, read, upload};
 use crate::kernels::GROUP;
-use crate::kernels::math::vector::v3;
-use crate::kernels::middle::cut::{ROOM, no_polygon, whole};
+use crate::kernels::bodies::polygon::{ROOM, no_polygon, whole};
+use crate::kernels::geometry::vector::v3;
 
 /// Cuts of a case. Each has three heights, and 1 or −1 for the part that is kept.
 const CUTS: usize = 4;

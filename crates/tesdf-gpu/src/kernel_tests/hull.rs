@@ -3,9 +3,9 @@ use cubecl::prelude::*;
 use tesdf::collide::internal;
 
 use super::{device, read, upload};
-use crate::kernels::math::vector::v3;
-use crate::kernels::math::wrench::{Residual, Wrench};
-use crate::kernels::reduce::hull::empty_hull;
+use crate::kernels::geometry::vector::v3;
+use crate::kernels::report::hull::empty_hull;
+use crate::kernels::report::wrench::{Residual, Wrench};
 
 #[cube]
 fn read_wrench(numbers: &[f32], at: u32) -> Wrench {

@@ -4,7 +4,7 @@ use tesdf::asset::layout::List;
 
 use super::{device, groups_of, read, upload};
 use crate::kernels::GROUP;
-use crate::kernels::field::shapes::{
+use crate::kernels::scene::shape::{
     LISTS, NONE, PALETTE_STARTS, PALETTES, PALETTES_HIGH, Rules, STRIDE, Shapes, ShapesLaunch,
 };
 

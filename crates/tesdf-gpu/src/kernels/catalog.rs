@@ -10,23 +10,23 @@ use cubecl::server::Handle;
 use cubecl_common::device::{DeviceId, ServiceId};
 use cubecl_environment::stream::StreamId;
 
-use super::broad::meshlets::BlocksLaunch;
-use super::broad::ordered_pair::OrderedPairsLaunch;
-use super::broad::pairs::{FoundLaunch, InstancesLaunch, PairsLaunch};
-use super::broad::place::GivenLaunch;
-use super::counters::{self, CountersLaunch};
-use super::deform::bounds::MovingLaunch;
-use super::encode::sample::SamplesLaunch;
-use super::field::query;
-use super::field::shapes::{FansLaunch, Rules, ShapesLaunch};
-use super::middle::items::{ItemsLaunch, PolygonsLaunch};
-use super::narrow::contacts::ContactsLaunch;
-use super::narrow::exact::AskedExactLaunch;
-use super::narrow::exchange::{LANES, Variant};
-use super::narrow::faces::AskedLaunch;
-use super::narrow::world::WorldContactsLaunch;
-use super::reduce::members::{MembersLaunch, TouchingLaunch};
-use super::{GROUP, broad, deform, encode, field, middle, narrow, reduce};
+use super::{GROUP, bodies, cones, deform, detect, encode, narrow, pairs, query, report, scene};
+use crate::kernels::counters::{self, CountersLaunch};
+use crate::kernels::deform::bounds::MovingLaunch;
+use crate::kernels::detect::candidates::{ItemsLaunch, PolygonsLaunch};
+use crate::kernels::detect::ordered_pair::OrderedPairsLaunch;
+use crate::kernels::encode::sampled::SamplesLaunch;
+use crate::kernels::narrow::exact::AskedExactLaunch;
+use crate::kernels::narrow::exchange::{LANES, Variant};
+use crate::kernels::narrow::frank_wolfe::AskedLaunch;
+use crate::kernels::pairs::instance_pairs::{FoundLaunch, InstancesLaunch, PairsLaunch};
+use crate::kernels::pairs::meshlets::BlocksLaunch;
+use crate::kernels::query::batch;
+use crate::kernels::report::contact::ContactsLaunch;
+use crate::kernels::report::reduce::members::{MembersLaunch, TouchingLaunch};
+use crate::kernels::report::world_contacts::WorldContactsLaunch;
+use crate::kernels::scene::pose_arrays::PoseArraysLaunch;
+use crate::kernels::scene::shape::{FansLaunch, Rules, ShapesLaunch};
 
 /// Source of the number of blocks of a launch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -72,43 +72,43 @@ type Target = Arc<TargetProperties>;
 pub fn kernels(device: &Device, target: &Target) -> Vec<Named> {
     let mut all = Vec::new();
     add_shapes(&mut all, device, target);
-    add_broad(&mut all, device, target);
-    add_middle(&mut all, device, target);
+    add_pairs(&mut all, device, target);
+    add_bodies(&mut all, device, target);
     add_narrow(&mut all, device, target);
-    add_reduce(&mut all, device, target);
+    add_report(&mut all, device, target);
     all
 }
 
 /// Adds the kernels of queries, deformation and encoding.
 fn add_shapes(all: &mut Vec<Named>, device: &Device, target: &Target) {
-    let instances = || query::InstancesLaunch::new(rows(), words());
-    let answers = || query::AnswersLaunch::new(rows(), words());
-    let world = || query::WorldAnswersLaunch::new(words(), words(), words(), words());
+    let instances = || batch::InstancesLaunch::new(rows(), words());
+    let answers = || batch::AnswersLaunch::new(rows(), words());
+    let world = || batch::WorldAnswersLaunch::new(words(), words(), words(), words());
     let moving = || MovingLaunch::new(words(), words(), rows(), words(), rows(), 0);
     let samples = || SamplesLaunch::new(rows(), rows(), words(), words(), 1, 1);
-    let batch = query::BatchLaunch::new(1, 0, 1);
-    let group = encode::sample::GROUP as u32;
+    let batch = batch::BatchLaunch::new(1, 0, 1);
+    let group = encode::sampled::GROUP as u32;
     kernels!(all, device, target;
-        Direct field::query::signed_distances, GROUP, (shapes(), instances(), rows(), answers(), batch);;
-        Direct field::query::world_distances, GROUP, (shapes(), instances(), words(), world(), 1, 1);;
-        Direct deform::follow::follow, GROUP, (moving());;
+        Direct query::batch::signed_distances, GROUP, (shapes(), instances(), rows(), answers(), batch);;
+        Direct query::batch::world_distances, GROUP, (shapes(), instances(), words(), world(), 1, 1);;
+        Direct deform::move_vertices::follow, GROUP, (moving());;
         Direct deform::refit::refit, deform::refit::GROUP, (moving());;
-        Direct encode::sample::sample, group, (samples(), words(), 0, 1);;
+        Direct encode::sampled::sample, group, (samples(), words(), 0, 1);;
     );
 }
 
 /// Adds the kernels of the broad phase, and those that compute the number of groups of a launch.
-fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
+fn add_pairs(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let instances = || InstancesLaunch::new(rows(), words(), 1, 0.0);
     let some = || PairsLaunch::new(words(), 0);
     let found = || FoundLaunch::new(pairs(), blocks());
-    let given = || GivenLaunch::new(words(), words(), rows(), words(), 1, 1, 1.0);
+    let given = || PoseArraysLaunch::new(words(), words(), rows(), words(), 1, 1, 1.0);
     kernels!(all, device, target;
-        Direct broad::place::place, GROUP, (given(), counters(), rows());;
-        Direct broad::pairs::instance_bounds, GROUP, (shapes(), instances(), counters(), rows());;
-        Direct broad::pairs::instance_pairs, GROUP, (shapes(), instances(), rows(), some(), counters(), found());;
-        Direct broad::pairs::given_pairs, GROUP, (shapes(), instances(), some(), counters(), found());;
-        Indirect broad::meshlets::meshlets, LANES, (shapes(), pairs(), blocks(), counters(), blocks(), 1);;
+        Direct scene::pose_arrays::place, GROUP, (given(), counters(), rows());;
+        Direct pairs::instance_pairs::instance_bounds, GROUP, (shapes(), instances(), counters(), rows());;
+        Direct pairs::instance_pairs::instance_pairs, GROUP, (shapes(), instances(), rows(), some(), counters(), found());;
+        Direct pairs::instance_pairs::given_pairs, GROUP, (shapes(), instances(), some(), counters(), found());;
+        Indirect pairs::meshlets::meshlets, LANES, (shapes(), pairs(), blocks(), counters(), blocks(), 1);;
     );
     for counter in
         [counters::BLOCKS, counters::MESHLETS, counters::POLYGONS, counters::CONTACTS, counters::TOUCHING]
@@ -120,15 +120,15 @@ fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
 }
 
 /// Adds the kernels of the middle phase: nodes, polygons and hidden overlaps.
-fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
+fn add_bodies(all: &mut Vec<Named>, device: &Device, target: &Target) {
     kernels!(all, device, target;
-        Indirect middle::nodes::nodes, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
-        Indirect middle::faces::whole_faces, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
-        Indirect middle::clip::clip_polygons, LANES,
+        Indirect bodies::nodes::nodes, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
+        Indirect bodies::faces::whole_faces, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
+        Indirect bodies::clip::clip_polygons, LANES,
             (shapes(), pairs(), blocks(), counters(), polygons(), 1);;
-        Indirect middle::outside::outside_polygons, LANES,
+        Indirect bodies::outside::outside_polygons, LANES,
             (shapes(), pairs(), blocks(), counters(), polygons(), 1);;
-        Indirect middle::hidden::hidden, LANES, (shapes(), pairs(), blocks(), counters(), words(), 1);;
+        Indirect detect::hidden::hidden, LANES, (shapes(), pairs(), blocks(), counters(), words(), 1);;
     );
 }
 
@@ -140,10 +140,10 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let asked = || AskedLaunch::new(1, 0.0);
     let in_world = || WorldContactsLaunch::new(words(), words(), words(), words(), words());
     kernels!(all, device, target;
-        Direct narrow::sorted::begin, GROUP, (words(), 1);;
-        Direct narrow::sorted::merge, GROUP, (contacts(), words(), words(), 1, 1);;
-        Direct narrow::world::to_world, GROUP, (contacts(), words(), rows(), words(), in_world(), 1);;
-        Indirect narrow::cones::contact::in_cones, GROUP, (shapes(), fans(), pairs(), words(), counters(), contacts());;
+        Direct report::order::begin, GROUP, (words(), 1);;
+        Direct report::order::merge, GROUP, (contacts(), words(), words(), 1, 1);;
+        Direct report::world_contacts::to_world, GROUP, (contacts(), words(), rows(), words(), in_world(), 1);;
+        Indirect cones::contact::in_cones, GROUP, (shapes(), fans(), pairs(), words(), counters(), contacts());;
         Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), false);;
@@ -163,7 +163,7 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
                 let exchange = if subgroups { "subgroups" } else { "shared memory" };
                 let counting = if counting { ", counting" } else { "" };
                 kernels!(all, device, target;
-                    Indirect narrow::faces::narrow_faces, LANES,
+                    Indirect narrow::frank_wolfe::narrow_faces, LANES,
                         (shapes(), pairs(), polygons(), counters(), contacts(), asked(), variant);
                         format!("{lanes} lanes, {exchange}{counting}");;
                 );
@@ -173,16 +173,16 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
 }
 
 /// Adds the kernels of the reduction.
-fn add_reduce(all: &mut Vec<Named>, device: &Device, target: &Target) {
-    let group = reduce::members::GROUP;
+fn add_report(all: &mut Vec<Named>, device: &Device, target: &Target) {
+    let group = report::reduce::members::GROUP;
     let touching = || TouchingLaunch::new(words(), 1);
     let members = || MembersLaunch::new(words(), rows());
     kernels!(all, device, target;
-        Direct reduce::members::clear, group, (words(), 1);;
-        Indirect reduce::members::count, group, (contacts(), counters(), words());;
-        Direct reduce::members::allot, group, (pairs(), counters(), words(), touching());;
-        Indirect reduce::members::fill, group, (pairs(), contacts(), counters(), words(), members());;
-        Indirect reduce::reduce::reduce, reduce::choice::GROUP,
+        Direct report::reduce::members::clear, group, (words(), 1);;
+        Indirect report::reduce::members::count, group, (contacts(), counters(), words());;
+        Direct report::reduce::members::allot, group, (pairs(), counters(), words(), touching());;
+        Indirect report::reduce::members::fill, group, (pairs(), contacts(), counters(), words(), members());;
+        Indirect report::reduce::selection::reduce, report::reduce::choice::GROUP,
             (contacts(), counters(), touching(), members(), rows(), contacts(), 1);;
     );
 }

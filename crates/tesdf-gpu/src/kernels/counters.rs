@@ -37,7 +37,7 @@ pub const MEMBERS: u32 = 13;
 /// Contacts that the reduction keeps.
 pub const KEPT: u32 = 14;
 /// Threads that found an overlap that contacts need not show: see
-/// [`hidden`](super::middle::hidden).
+/// [`hidden`](crate::kernels::detect::hidden).
 pub const HIDDEN: u32 = 15;
 /// Instances that an array on the device places at what is no pose.
 pub const BADLY_PLACED: u32 = 16;

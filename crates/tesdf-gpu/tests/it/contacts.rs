@@ -25,7 +25,8 @@ fn pairs_of_bodies() {
         [["l_bracket", "cube"], ["torus_quads", "tetra"], ["tetra", "l_bracket"], ["beam", "torus_quads"]];
     let relations = RELATIONS.into_iter().filter(|r| !matches!(r, Relation::Apart | Relation::Far));
     for (k, names) in names.into_iter().enumerate() {
-        // Half of the relations: these tests take minutes where a processor stands in for the device.
+        // Half of the relations: these tests take minutes where a processor stands in for the
+        // device.
         for relation in relations.clone().skip(k % 2).step_by(2) {
             let bodies: [Placed; 2] = relation.place(names, &mut random);
             let size = bodies[0].diagonal().max(bodies[1].diagonal());

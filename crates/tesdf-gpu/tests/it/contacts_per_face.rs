@@ -8,7 +8,7 @@ use crate::support::random::Random;
 use tesdf::collide::{
     CollideOptions, Contacts, ContactsPer, Mode, Placement, Pose, Reduction, Scene, detect,
 };
-use tesdf_gpu::{Counting, Detector, DetectorOptions, DeviceArray, GivenPoses};
+use tesdf_gpu::{Counting, Detector, DetectorOptions, DeviceArray, PoseArrays};
 
 fn on_device(scene: &Scene, options: &CollideOptions) -> Contacts {
     found(scene, options, DetectorOptions::default()).0
@@ -107,7 +107,7 @@ fn the_processor_steps_over_whole_faces() {
     };
     let poses: Vec<f32> = scene.instances().flat_map(|(_, instance)| of_instance(instance.pose)).collect();
     let poses = DeviceArray::upload(&device, &poses).expect("fits");
-    let given = GivenPoses { poses: &poses, velocities: None };
+    let given = PoseArrays { poses: &poses, velocities: None };
     for contacts_per in [ContactsPer::Face, ContactsPer::Minimum] {
         for reduction in [Reduction::None, Reduction::PerPair(3), Reduction::Spread(3)] {
             let options = CollideOptions {

@@ -13,7 +13,7 @@ pub static SOURCES: LazyLock<Vec<CudaSource>> = LazyLock::new(|| sources().unwra
 #[ignore = "minutes, for one text: .ci/kernels.sh runs it where a kernel changes"]
 fn arguments_are_pointers_then_scalars_and_lengths() {
     let named = |name: &str| SOURCES.iter().find(|s| s.kernel == name).expect("the kernel is listed");
-    let direct = named("field::query::signed_distances");
+    let direct = named("query::batch::signed_distances");
     let parameters = parameters(direct);
     // Buffers: three for the shapes, two for the instances, one each for points, answers and faces.
     let types: Vec<&str> = parameters.iter().map(|p| p.split_whitespace().next().unwrap_or("")).collect();
@@ -29,7 +29,7 @@ fn arguments_are_pointers_then_scalars_and_lengths() {
     let info = between(&direct.text, "struct info_st {", "};");
     let fields: Vec<&str> = info.split_inclusive(';').map(str::trim).filter(|f| !f.is_empty()).collect();
     assert_eq!(fields, ["uint32_t scalars_u32[4];", "uint32_t static_meta[8];"]);
-    let indirect = named("middle::nodes::nodes");
+    let indirect = named("bodies::nodes::nodes");
     assert!(indirect.count == Count::Indirect && indirect.entry.ends_with("_indirect"));
     assert!(indirect.text.contains(&format!(" {}(", indirect.entry)));
     assert!(

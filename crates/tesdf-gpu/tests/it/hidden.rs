@@ -98,8 +98,8 @@ fn bars_that_cross_and_bodies_that_touch() {
     }
 }
 
-/// Both report the overlaps that are certain to be found. They may differ in overlaps so shallow, or
-/// so near to the depth that contacts show, that finding them depends on the search.
+/// Both report the overlaps that are certain to be found. They may differ in overlaps so shallow,
+/// or so near to the depth that contacts show, that finding them depends on the search.
 #[test]
 fn relations_of_meshes_are_told_as_by_the_host() {
     let names = ["cube", "tetra", "l_bracket", "beam", "torus_quads", "spoon"];

@@ -33,8 +33,8 @@ fn add_world(scene: &mut Scene, world: u32, placed: impl IntoIterator<Item = (Sh
     }
 }
 
-/// Instances that kernels detect beside some that they do not: the contacts are those of the two, in
-/// the order of all.
+/// Instances that kernels detect beside some that they do not: the contacts are those of the two,
+/// in the order of all.
 #[test]
 fn the_processor_detects_fields_that_jump_and_faces_that_look_inwards() {
     let cube = || Parts::default().cube(DVec3::splat(-0.5), 1.0, Outward).turned().mesh();

@@ -15,7 +15,7 @@ use tesdf::collide::{
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3, Vec3};
 use tesdf::mesh::SolidMesh;
-use tesdf_gpu::{Detector, DetectorOptions, Device, DeviceArray, DeviceContacts, GivenPoses, GpuError};
+use tesdf_gpu::{Detector, DetectorOptions, Device, DeviceArray, DeviceContacts, GpuError, PoseArrays};
 
 pub fn detector(scene: &Scene) -> Detector {
     Detector::new(&device(), scene, DetectorOptions::default()).expect("fits")
@@ -59,7 +59,8 @@ pub fn read(device: &Device, found: &DeviceContacts) -> Vec<Row> {
         .collect()
 }
 
-/// The contacts of a scene that stay on the device. All of each face, which the device only reduces.
+/// The contacts of a scene that stay on the device. All of each face, which the device only
+/// reduces.
 pub fn staying(scene: &Scene, options: &CollideOptions) -> Vec<Contact> {
     let reduction = match options.mode.contacts_per() {
         Some(ContactsPer::Cell) | None => Reduction::None,
@@ -265,7 +266,7 @@ fn poses_come_from_arrays() {
     let mut detector = detector(&scene);
     let device = detector.device().clone();
     let (poses, velocities) = arrays(&device, &scene);
-    let given = GivenPoses { poses: &poses, velocities: Some(&velocities) };
+    let given = PoseArrays { poses: &poses, velocities: Some(&velocities) };
     let ahead = |speculative_time| CollideOptions {
         contact_distance: 0.01,
         speculative_time,
@@ -287,7 +288,7 @@ fn poses_come_from_arrays() {
     }
     assert!(counts[0] > 100 && counts[1] > counts[0], "{counts:?}");
     // Without velocities all are at rest.
-    let still = GivenPoses { velocities: None, ..given };
+    let still = PoseArrays { velocities: None, ..given };
     let found = detector.detect_on_device(&stale, Some(&still), &ahead(2.0)).expect("detects");
     assert_eq!(found.count, counts[0]);
 }
@@ -335,7 +336,7 @@ fn contacts_of_the_processor_join_those_of_the_device() {
     let mut detector = detector(&scene);
     let device = detector.device().clone();
     let (poses, velocities) = arrays(&device, &scene);
-    let given = GivenPoses { poses: &poses, velocities: Some(&velocities) };
+    let given = PoseArrays { poses: &poses, velocities: Some(&velocities) };
     let stale = elsewhere(&scene);
     let forms = each_form();
     let ahead = CollideOptions { speculative_time: 2.0, ..forms[0] };
@@ -354,7 +355,7 @@ fn contacts_of_the_processor_join_those_of_the_device() {
     let mut bad = poses.read(&device).expect("numbers");
     bad[7 + 6] += 0.1;
     let bad = DeviceArray::upload(&device, &bad).expect("fits");
-    let given = GivenPoses { poses: &bad, velocities: None };
+    let given = PoseArrays { poses: &bad, velocities: None };
     let error = detector.detect_on_device(&stale, Some(&given), &forms[0]).err().expect("no pose");
     assert!(matches!(error, GpuError::Instance { instance: 1, .. }), "{error}");
 }
@@ -407,7 +408,7 @@ fn what_is_no_pose_is_an_error() {
     let mut detect = |poses: &[f32], velocities: Option<&[f32]>| {
         let poses = DeviceArray::upload(&device, poses).expect("fits");
         let velocities = velocities.map(|numbers| DeviceArray::upload(&device, numbers).expect("fits"));
-        let given = GivenPoses { poses: &poses, velocities: velocities.as_ref() };
+        let given = PoseArrays { poses: &poses, velocities: velocities.as_ref() };
         detector.detect_on_device(&scene, Some(&given), &options).map(|found| found.count)
     };
     let at = |x: f32, w: f32| [x, 0.0, 0.0, 0.0, 0.0, 0.0, w];

@@ -119,7 +119,8 @@ fn points_times_instances() {
     }
 }
 
-/// Points as far out as there are numbers have the answers of the processor, and finite ones in `f32`.
+/// Points as far out as there are numbers have the answers of the processor, and finite ones in
+/// `f32`.
 #[test]
 fn points_far_out_are_answered() {
     let device = Device::choose(None).expect("a device");

@@ -191,6 +191,38 @@ fn no_files_use_each_other_in_a_cycle() {
     assert!(circles.is_empty(), "{circles:?}");
 }
 
+/// Folders of kernels have the names of folders of the library. A file that has the name of one there
+/// mirrors it, and says so at its head.
+#[test]
+fn kernels_mirror_the_files_whose_names_they_have() {
+    let krate = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let [library, collide] = ["src", "src/collide"].map(|folder| krate.join(folder));
+    let kernels = krate.join("../tesdf-gpu/src/kernels");
+    let (mut open, mut twins) = (vec![kernels.clone()], 0);
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder of kernels") {
+            let path = entry.expect("an entry").path();
+            let name = path.strip_prefix(&kernels).expect("of the folder").to_path_buf();
+            if path.is_dir() {
+                assert!(library.join(&name).is_dir() || collide.join(&name).is_dir(), "{}", name.display());
+                open.push(path);
+                continue;
+            }
+            let twin =
+                [&collide, &library].map(|room| room.join(&name)).into_iter().find(|twin| twin.exists());
+            let twin = twin.filter(|_| name.file_name().is_some_and(|name| name != "mod.rs"));
+            let mirrors = twin.map(|twin| twin.strip_prefix(&library).expect("a file").display().to_string());
+            let text = fs::read_to_string(&path).expect("text");
+            let said = text
+                .lines()
+                .find_map(|line| line.strip_prefix("//! Mirrors `")?.strip_suffix("` of `tesdf`."));
+            assert_eq!(said, mirrors.as_deref(), "{}", name.display());
+            twins += usize::from(said.is_some());
+        }
+    }
+    assert!(twins > 20, "{twins} files mirror others");
+}
+
 /// A file that no test program names would not be compiled, and nothing would say so.
 #[test]
 fn every_test_file_belongs_to_a_program() {

@@ -4,8 +4,8 @@ use tesdf::collide::{CollideOptions, Instance, InstanceId, Scene, ShapeId, insta
 
 use super::placed::{FieldFrame, Placed};
 use crate::GpuError;
-use crate::kernels::broad::ahead;
-use crate::kernels::broad::pairs::{INSTANCE_ROWS, INSTANCE_WORDS};
+use crate::kernels::pairs::ahead;
+use crate::kernels::pairs::instance_pairs::{INSTANCE_ROWS, INSTANCE_WORDS};
 
 /// The instances whose contacts kernels find, sorted by world and then by id.
 pub struct Instances {
@@ -17,8 +17,8 @@ pub struct Instances {
     pub shapes: Vec<usize>,
     /// [`INSTANCE_ROWS`] rows for each instance: all poses, then all motions.
     pub rows: Vec<[f32; 4]>,
-    /// [`FIXED_ROWS`](crate::kernels::broad::place::FIXED_ROWS) rows for each instance, where an
-    /// array on the device has the poses; otherwise empty.
+    /// [`FIXED_ROWS`](crate::kernels::scene::pose_arrays::FIXED_ROWS) rows for each instance, where
+    /// an array on the device has the poses; otherwise empty.
     pub fixed: Vec<[f32; 4]>,
     /// [`INSTANCE_WORDS`] words for each instance.
     pub words: Vec<u32>,

@@ -3,7 +3,7 @@ use tesdf::asset::layout::TreeChild;
 use tesdf::collide::Shape;
 
 use super::placed::split;
-use crate::kernels::field::shapes::{NONE, TREE_NODES};
+use crate::kernels::scene::shape::{NONE, TREE_NODES};
 
 /// The host's data for moving the vertices of a shape.
 #[derive(Clone, Debug)]

@@ -6,9 +6,9 @@ use crate::GpuError;
 use crate::device::{DeviceArray, spread};
 use crate::kernels::GROUP;
 use crate::kernels::deform::bounds::MovingLaunch;
-use crate::kernels::deform::follow::follow;
+use crate::kernels::deform::move_vertices::follow;
 use crate::kernels::deform::refit;
-use crate::kernels::field::shapes::{BAD_VERTEX, NONE, STRIDE};
+use crate::kernels::scene::shape::{BAD_VERTEX, NONE, STRIDE};
 
 impl GpuShapes {
     /// Moves all vertices of a shape with a conforming domain (Sec. V-D of the paper).

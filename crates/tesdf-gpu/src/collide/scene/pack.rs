@@ -10,13 +10,13 @@ use tesdf::query::{Arrays, SignArrays};
 
 use super::movable::{face_levels, tree_levels};
 use super::roots::Roots;
-use crate::kernels::broad::meshlets::FACES_OF_MESHLET;
 use crate::kernels::deform::refit::GROWN;
-use crate::kernels::field::nearest::TREE_DEPTH;
-use crate::kernels::field::rule;
-use crate::kernels::field::shapes::{self, STRIDE};
+use crate::kernels::pairs::meshlets::FACES_OF_MESHLET;
+use crate::kernels::query::nearest::TREE_DEPTH;
+use crate::kernels::query::sign;
+use crate::kernels::scene::shape::{self as layout, STRIDE};
 
-/// The contents of the buffers of [`Shapes`](crate::kernels::field::shapes::Shapes).
+/// The contents of the buffers of [`Shapes`](crate::kernels::scene::shape::Shapes).
 #[derive(Default)]
 pub struct Packed {
     pub table: Vec<u32>,
@@ -41,33 +41,33 @@ impl Packed {
     fn entry(&mut self, shape: &Shape) -> Result<[u32; STRIDE as usize], String> {
         let mut row = [0u32; STRIDE as usize];
         let mut sizes = |kind: u32, sizes: DVec3| {
-            row[shapes::KIND as usize] = kind;
-            let at = shapes::SIZES as usize;
+            row[layout::KIND as usize] = kind;
+            let at = layout::SIZES as usize;
             row[at..at + 3].copy_from_slice(&sizes.as_vec3().to_array().map(f32::to_bits));
         };
         match shape {
             Shape::Mesh(asset) => {
                 return self.add_mesh(asset);
             }
-            Shape::Plane => sizes(shapes::PLANE, DVec3::ZERO),
-            Shape::Box { half_extents } => sizes(shapes::BOX, *half_extents),
-            Shape::Sphere { radius } => sizes(shapes::ROUND, DVec3::new(0.0, *radius, 0.0)),
+            Shape::Plane => sizes(layout::PLANE, DVec3::ZERO),
+            Shape::Box { half_extents } => sizes(layout::BOX, *half_extents),
+            Shape::Sphere { radius } => sizes(layout::ROUND, DVec3::new(0.0, *radius, 0.0)),
             Shape::Capsule { half_height, radius } => {
-                sizes(shapes::ROUND, DVec3::new(*half_height, *radius, 0.0));
+                sizes(layout::ROUND, DVec3::new(*half_height, *radius, 0.0));
             }
         }
-        row[shapes::DIAGONAL as usize] = bounded(shape.diagonal()).to_bits();
-        row[shapes::FANS as usize] = shapes::NONE;
-        row[shapes::MESHLET_COUNT as usize] = 1;
-        row[shapes::BAD_VERTEX as usize] = shapes::NONE;
+        row[layout::DIAGONAL as usize] = bounded(shape.diagonal()).to_bits();
+        row[layout::FANS as usize] = layout::NONE;
+        row[layout::MESHLET_COUNT as usize] = 1;
+        row[layout::BAD_VERTEX as usize] = layout::NONE;
         // A plane has two triangles, whose size depends on the field that they meet.
-        row[shapes::FACE_COUNT as usize] = 2;
+        row[layout::FACE_COUNT as usize] = 2;
         if !matches!(shape, Shape::Plane) {
             let records = simple_records(shape);
-            row[shapes::FACE_COUNT as usize] = records.len() as u32;
-            row[shapes::RECORDS as usize] = self.rows_at(records.into_iter().flat_map(four))?;
+            row[layout::FACE_COUNT as usize] = records.len() as u32;
+            row[layout::RECORDS as usize] = self.rows_at(records.into_iter().flat_map(four))?;
         }
-        row[shapes::INNER_BALL as usize] = self.rows_at([inner_ball(shape.inner_ball())].into_iter())?;
+        row[layout::INNER_BALL as usize] = self.rows_at([inner_ball(shape.inner_ball())].into_iter())?;
         Ok(row)
     }
 
@@ -80,74 +80,74 @@ impl Packed {
         }
         let mut row = [0u32; STRIDE as usize];
         let mut set = |at: u32, value: u32| row[at as usize] = value;
-        set(shapes::KIND, shapes::MESH);
-        set(shapes::NODES, self.words_at(mesh.nodes.iter().copied())?);
-        set(shapes::LISTS, self.bytes_at(mesh.lists)?);
-        set(shapes::PALETTE_STARTS, self.words_at(mesh.palette_starts.iter().copied())?);
+        set(layout::KIND, layout::MESH);
+        set(layout::NODES, self.words_at(mesh.nodes.iter().copied())?);
+        set(layout::LISTS, self.bytes_at(mesh.lists)?);
+        set(layout::PALETTE_STARTS, self.words_at(mesh.palette_starts.iter().copied())?);
         let halves =
             mesh.palettes.chunks(2).map(|c| u32::from(c[0]) | u32::from(*c.get(1).unwrap_or(&0)) << 16);
-        set(shapes::PALETTES, self.words_at(halves)?);
-        set(shapes::PALETTES_HIGH, mesh.palettes_high.map_or(Ok(shapes::NONE), |high| self.bytes_at(high))?);
-        set(shapes::BOUNDS, self.bytes_at(mesh.cell_bounds)?);
-        set(shapes::CHILDREN, self.words_at(mesh.tree_children.as_flattened().iter().copied())?);
-        set(shapes::RECORDS, self.rows_at(records(mesh).into_iter().flat_map(four))?);
+        set(layout::PALETTES, self.words_at(halves)?);
+        set(layout::PALETTES_HIGH, mesh.palettes_high.map_or(Ok(layout::NONE), |high| self.bytes_at(high))?);
+        set(layout::BOUNDS, self.bytes_at(mesh.cell_bounds)?);
+        set(layout::CHILDREN, self.words_at(mesh.tree_children.as_flattened().iter().copied())?);
+        set(layout::RECORDS, self.rows_at(records(mesh).into_iter().flat_map(four))?);
         set(
-            shapes::BOXES,
+            layout::BOXES,
             self.rows_at(mesh.tree_boxes.iter().flat_map(|b| {
                 let (rows, _) = b.as_chunks::<4>();
                 rows.to_vec()
             }))?,
         );
         let meshlets = meshlets(mesh);
-        set(shapes::MESHLETS, self.rows_at(meshlets.iter().map(|&(start, count)| ball(mesh, start, count)))?);
+        set(layout::MESHLETS, self.rows_at(meshlets.iter().map(|&(start, count)| ball(mesh, start, count)))?);
         set(
-            shapes::MESHLET_FACES,
+            layout::MESHLET_FACES,
             self.words_at(meshlets.iter().flat_map(|&(start, count)| [start, count]))?,
         );
-        set(shapes::MESHLET_COUNT, meshlets.len() as u32);
-        set(shapes::FACE_COUNT, mesh.faces.len() as u32);
-        set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
-        set(shapes::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
-        set(shapes::FANS, self.fans_at(asset)?);
+        set(layout::MESHLET_COUNT, meshlets.len() as u32);
+        set(layout::FACE_COUNT, mesh.faces.len() as u32);
+        set(layout::EXACT_LISTS, u32::from(mesh.has_exact_lists));
+        set(layout::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
+        set(layout::FANS, self.fans_at(asset)?);
         if let Some(sign) = &sign {
-            set(shapes::RULE, rule_of(sign));
+            set(layout::RULE, rule_of(sign));
             let triangles = [&sign.triangles[..], &sign.closing].concat();
             let record = |corners: &[DVec3; 3]| {
                 let (triangle, hints) = (Triangle::new(*corners), SignHints::default());
                 without_nan(*FaceRecord::new(&triangle, mesh.cube.middle(), hints).as_array())
             };
             let records = triangles.iter().map(record).flat_map(four);
-            set(shapes::SIGN_TRIANGLES, self.rows_at(records)?);
-            set(shapes::SIGN_COUNT, triangles.len() as u32);
-            set(shapes::CLOSING_COUNT, sign.closing.len() as u32);
-            set(shapes::TURNED, u32::from(!sign.faces_look_outward));
+            set(layout::SIGN_TRIANGLES, self.rows_at(records)?);
+            set(layout::SIGN_COUNT, triangles.len() as u32);
+            set(layout::CLOSING_COUNT, sign.closing.len() as u32);
+            set(layout::TURNED, u32::from(!sign.faces_look_outward));
         }
         let roots = Roots::new(mesh);
-        set(shapes::TETRAHEDRA, self.rows_at(roots.rows.into_iter())?);
-        set(shapes::TREE_BOXES, self.rows_at(roots.boxes.into_iter())?);
-        set(shapes::TREE, self.words_at(roots.tree.iter().flatten().copied())?);
-        set(shapes::TREE_NODES, roots.tree.len() as u32);
-        set(shapes::INNER_BALL, self.rows_at([inner_ball(mesh.inner_ball)].into_iter())?);
-        set(shapes::BAD_VERTEX, shapes::NONE);
+        set(layout::TETRAHEDRA, self.rows_at(roots.rows.into_iter())?);
+        set(layout::TREE_BOXES, self.rows_at(roots.boxes.into_iter())?);
+        set(layout::TREE, self.words_at(roots.tree.iter().flatten().copied())?);
+        set(layout::TREE_NODES, roots.tree.len() as u32);
+        set(layout::INNER_BALL, self.rows_at([inner_ball(mesh.inner_ball)].into_iter())?);
+        set(layout::BAD_VERTEX, layout::NONE);
         if !roots.tree.is_empty() {
-            set(shapes::TET_VERTICES, self.words_at(mesh.tetrahedra.as_flattened().iter().copied())?);
-            set(shapes::FACE_LEVELS, self.words_at(face_levels(mesh.tree_children).into_iter())?);
-            set(shapes::TREE_LEVELS, self.words_at(tree_levels(&roots.tree).into_iter())?);
-            set(shapes::VERTEX_COUNT, (mesh.vertices.len() + mesh.domain_vertices.len()) as u32);
+            set(layout::TET_VERTICES, self.words_at(mesh.tetrahedra.as_flattened().iter().copied())?);
+            set(layout::FACE_LEVELS, self.words_at(face_levels(mesh.tree_children).into_iter())?);
+            set(layout::TREE_LEVELS, self.words_at(tree_levels(&roots.tree).into_iter())?);
+            set(layout::VERTEX_COUNT, (mesh.vertices.len() + mesh.domain_vertices.len()) as u32);
         }
         let mut set = |at: u32, value: f64| set(at, (value as f32).to_bits());
-        set(shapes::SIDE, mesh.cube.side());
-        set(shapes::INVERSE_SIDE, 1.0 / mesh.cube.side());
-        set(shapes::BOUND_UNIT, mesh.cell_bound_unit);
-        set(shapes::BAND, mesh.band);
-        set(shapes::HALF_THICKNESS, mesh.half_thickness);
-        set(shapes::DIAGONAL, mesh.bounds.extent().length());
+        set(layout::SIDE, mesh.cube.side());
+        set(layout::INVERSE_SIDE, 1.0 / mesh.cube.side());
+        set(layout::BOUND_UNIT, mesh.cell_bound_unit);
+        set(layout::BAND, mesh.band);
+        set(layout::HALF_THICKNESS, mesh.half_thickness);
+        set(layout::DIAGONAL, mesh.bounds.extent().length());
         let beyond = sign.map_or(0.0, |sign| sign.reach_beyond);
-        set(shapes::REACH_BEYOND, beyond);
+        set(layout::REACH_BEYOND, beyond);
         let bounds = mesh.bounds.grown(mesh.half_thickness + beyond);
         for axis in 0..3 {
-            set(shapes::LOW + axis as u32, (bounds.min - mesh.cube.middle())[axis]);
-            set(shapes::HIGH + axis as u32, (bounds.max - mesh.cube.middle())[axis]);
+            set(layout::LOW + axis as u32, (bounds.min - mesh.cube.middle())[axis]);
+            set(layout::HIGH + axis as u32, (bounds.max - mesh.cube.middle())[axis]);
         }
         Ok(row)
     }
@@ -155,7 +155,7 @@ impl Packed {
     /// The place of the fans of a mesh for the table. [`fans`] makes them.
     fn fans_at(&mut self, asset: &TeSdf) -> Result<u32, String> {
         if !has_fans(asset) {
-            return Ok(shapes::NONE);
+            return Ok(layout::NONE);
         }
         let start = u32::try_from(self.fans).map_err(too_many_words)?;
         self.fans += words_of_fans(asset);
@@ -187,13 +187,13 @@ impl Packed {
     }
 }
 
-/// The number of a rule in [`shapes::RULE`].
+/// The number of a rule in [`layout::RULE`].
 fn rule_of(sign: &SignArrays) -> u32 {
     match sign.rule {
-        InsideRule::Generalized if !sign.closing.is_empty() => rule::GENERALIZED,
-        InsideRule::Nonzero | InsideRule::Generalized => rule::NONZERO,
-        InsideRule::Odd => rule::ODD,
-        InsideRule::Winding | InsideRule::Sheet { .. } => rule::WINDING,
+        InsideRule::Generalized if !sign.closing.is_empty() => sign::GENERALIZED,
+        InsideRule::Nonzero | InsideRule::Generalized => sign::NONZERO,
+        InsideRule::Odd => sign::ODD,
+        InsideRule::Winding | InsideRule::Sheet { .. } => sign::WINDING,
     }
 }
 
@@ -206,7 +206,7 @@ fn words_of_fans(asset: &TeSdf) -> usize {
     2 * asset.arrays().vertices.len() + 1 + 3 * asset.face_count()
 }
 
-/// The words of [`Fans`](shapes::Fans) for shapes that were packed.
+/// The words of [`Fans`](layout::Fans) for shapes that were packed.
 pub fn fans(shapes: &[Shape]) -> Vec<u32> {
     let mut words = Vec::new();
     for shape in shapes {
@@ -280,8 +280,8 @@ pub(crate) fn without_nan(mut record: [f32; 16]) -> [f32; 16] {
 fn with_owned(record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32; 16] {
     let mut record = without_nan(record);
     let hints = record[15].to_bits() & 0xFFFF;
-    let owned: u32 = owned.map(|k| 1 << (shapes::OWNED_CORNERS + k as u32)).sum();
-    record[15] = f32::from_bits(shapes::HINTS | hints | owned);
+    let owned: u32 = owned.map(|k| 1 << (layout::OWNED_CORNERS + k as u32)).sum();
+    record[15] = f32::from_bits(layout::HINTS | hints | owned);
     record
 }
 

@@ -62,7 +62,7 @@ impl Placed {
         self.rotation * v.as_dvec3()
     }
 
-    /// The rows that `kernels::math::pose` reads: the origin rounded to `f32`, with the unit; the
+    /// The rows that `kernels::scene::pose` reads: the origin rounded to `f32`, with the unit; the
     /// remainder of the origin; the quaternion x, y, z, w.
     pub fn rows(self) -> [[f32; 4]; 3] {
         let (high, low) = split(self.origin);

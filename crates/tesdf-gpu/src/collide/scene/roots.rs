@@ -5,9 +5,9 @@ use tesdf::geometry::Aabb;
 use tesdf::geometry::internal::{AabbTree, Child};
 use tesdf::query::Arrays;
 
-use crate::kernels::field::shapes::NONE;
-use crate::kernels::field::tetrahedra::{ROWS, Tetrahedron, tetrahedron_of};
-use crate::kernels::math::vector::{V3, v3};
+use crate::kernels::geometry::vector::{V3, v3};
+use crate::kernels::query::tetrahedra::{ROWS, Tetrahedron, tetrahedron_of};
+use crate::kernels::scene::shape::NONE;
 
 /// The roots in the layout that kernels read.
 pub struct Roots {

@@ -5,8 +5,8 @@ use super::movable::Moving;
 use super::pack::{Packed, fans};
 use crate::GpuError;
 use crate::device::{Buffer, Device};
-use crate::kernels::field::rule::{BY_CELLS, GENERALIZED};
-use crate::kernels::field::shapes::{FansLaunch, RULE, Rules, STRIDE, ShapesLaunch, TURNED};
+use crate::kernels::query::sign::{BY_CELLS, GENERALIZED};
+use crate::kernels::scene::shape::{FansLaunch, RULE, Rules, STRIDE, ShapesLaunch, TURNED};
 
 /// A list of shapes in the memory of a device.
 #[derive(Clone)]

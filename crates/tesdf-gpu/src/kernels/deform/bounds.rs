@@ -1,9 +1,9 @@
 //! A shape whose vertices move, and the bounds of these vertices.
 use cubecl::prelude::*;
 
-use super::super::field::nearest::{FAR, NodeBoxes, TreeChild};
-use super::super::field::shapes::{BOXES, Bounds, BoundsExpand, FACE_VERTICES, STRIDE};
-use super::super::math::vector::{Row, V3, last, row, v3, xyz};
+use crate::kernels::geometry::vector::{Row, V3, last, row, v3, xyz};
+use crate::kernels::query::nearest::{FAR, NodeBoxes, TreeChild};
+use crate::kernels::scene::shape::{BOXES, Bounds, BoundsExpand, FACE_VERTICES, STRIDE};
 
 /// The buffers of all shapes, and the new positions for one shape.
 #[derive(CubeType, CubeLaunch)]

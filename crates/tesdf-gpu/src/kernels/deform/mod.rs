@@ -1,5 +1,5 @@
 //! Deformation (Sec. V-D of the paper): updates the arrays of a shape after vertices have moved.
 //! Connectivity, lists and labels stay.
 pub mod bounds;
-pub mod follow;
+pub mod move_vertices;
 pub mod refit;

@@ -3,13 +3,13 @@
 //! of different groups.
 use cubecl::prelude::*;
 
-use super::super::field::nearest::{NodeBoxes, TreeChild};
-use super::super::field::shapes::{
+use crate::kernels::deform::bounds::{Moving, MovingExpand, no_bounds};
+use crate::kernels::geometry::vector::{V3, from_bits, last, row_of, to_bits, v3, xyz, zero};
+use crate::kernels::query::nearest::{NodeBoxes, TreeChild};
+use crate::kernels::scene::shape::{
     BAD_VERTEX, BOUND_UNIT, Bounds, CHILDREN, EXACT_LISTS, FACE_LEVELS, FACE_VERTICES, HIGH, INNER_BALL, LOW,
     MESHLET_COUNT, MESHLET_FACES, MESHLETS, NONE, SIDE, TREE, TREE_BOXES, TREE_LEVELS, VERTEX_COUNT,
 };
-use super::super::math::vector::{V3, from_bits, last, row_of, to_bits, v3, xyz, zero};
-use super::bounds::{Moving, MovingExpand, no_bounds};
 
 /// Threads of the group.
 pub const GROUP: u32 = 256;

@@ -1,2 +1,2 @@
 //! Encoding by samples.
-pub mod sample;
+pub mod sampled;

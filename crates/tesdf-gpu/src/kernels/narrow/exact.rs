@@ -3,20 +3,22 @@
 //! Outside of the solid, it is the least distance between the polygon and a face of the list. It
 //! has a closed form, and each thread takes a face. Inside the solid, branch and bound finds it,
 //! and each thread takes a piece of the polygon.
+//!
+//! Mirrors `collide/narrow/exact.rs` of `tesdf`.
 use cubecl::prelude::*;
 
-use super::super::broad::meshlets::ROUNDING;
-use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs};
-use super::super::counters::{self, Counters};
-use super::super::field::nearest::FAR;
-use super::super::field::shapes::Shapes;
-use super::super::math::vector::V3;
-use super::super::middle::items::{Polygons, Weights};
-use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
-use super::exchange::LANES;
-use super::piece::{Lowest, POOL, Piece, Pool, Region, empty_pool, region};
-use super::polygon_distance::{Disk, Polygon};
-use super::work::Work;
+use crate::kernels::counters::{self, Counters};
+use crate::kernels::detect::candidates::{Polygons, Weights};
+use crate::kernels::detect::ordered_pair::{OrderedPair, OrderedPairs};
+use crate::kernels::geometry::polygon_distance::{Disk, Polygon};
+use crate::kernels::geometry::vector::V3;
+use crate::kernels::narrow::exchange::LANES;
+use crate::kernels::narrow::operations::Work;
+use crate::kernels::pairs::meshlets::ROUNDING;
+use crate::kernels::query::nearest::FAR;
+use crate::kernels::report::contact::{CONVERGED, Contacts, NO_CORNER, Touch};
+use crate::kernels::scene::shape::Shapes;
+use crate::kernels::search::piece::{Lowest, POOL, Piece, Pool, Region, empty_pool, region};
 
 /// Rounds after which a search gives up. In each round the group halves up to [`LANES`] pieces. The
 /// processor counts evaluations instead (`MAX_EVALUATIONS` in `tesdf::collide::narrow`).

@@ -7,19 +7,19 @@
 //! surface, which proves the depth. Otherwise branch and bound finds it.
 use cubecl::prelude::*;
 
-use super::super::broad::ordered_pair::OrderedPairs;
-use super::super::counters::{self, Counters};
-use super::super::field::nearest::FAR;
-use super::super::field::shapes::{Field, NONE, Shapes};
-use super::super::math::vector::{V3, pick, zero};
-use super::super::middle::items::{Polygons, Weights};
-use super::contacts::Contacts;
-use super::exact::{AskedExact, CLEAR, Goal, Searched, nowhere, search};
-use super::extremes::{Limits, facing};
-use super::near::{Walk, axes_of, no_walk};
-use super::piece::{Lowest, Pool, Region, empty_pool, everywhere};
-use super::polygon_distance::{Disk, Polygon};
-use super::taken::{Memory, memory_of};
+use crate::kernels::counters::{self, Counters};
+use crate::kernels::detect::candidates::{Polygons, Weights};
+use crate::kernels::detect::ordered_pair::OrderedPairs;
+use crate::kernels::geometry::polygon_distance::{Disk, Polygon};
+use crate::kernels::geometry::vector::{V3, pick, zero};
+use crate::kernels::narrow::contact_points::{Memory, memory_of};
+use crate::kernels::narrow::exact::{AskedExact, CLEAR, Goal, Searched, nowhere, search};
+use crate::kernels::narrow::extremes::{Limits, facing};
+use crate::kernels::narrow::tree_walk::{Walk, axes_of, no_walk};
+use crate::kernels::query::nearest::FAR;
+use crate::kernels::report::contact::Contacts;
+use crate::kernels::scene::shape::{Field, NONE, Shapes};
+use crate::kernels::search::piece::{Lowest, Pool, Region, empty_pool, everywhere};
 
 /// A moved face clears the surface when its distance is more than this share of the tolerance,
 /// which is at least 1e-6. Distances between faces are off by less.
@@ -225,8 +225,8 @@ pub fn narrow_exact_faces(
 
 #[cfg(test)]
 mod tests {
-    use super::super::exchange::LANES;
     use super::*;
+    use crate::kernels::narrow::exchange::LANES;
 
     #[test]
     fn the_first_looks_are_a_grid_with_the_corners() {

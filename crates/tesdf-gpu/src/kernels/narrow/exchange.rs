@@ -2,7 +2,7 @@
 //! otherwise shared memory. Both give the same bits.
 use cubecl::prelude::*;
 
-use super::super::field::nearest::Nearest;
+use crate::kernels::query::nearest::Nearest;
 
 /// Threads that work on one polygon.
 pub const LANES: u32 = 32;

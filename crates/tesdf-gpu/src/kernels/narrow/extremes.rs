@@ -1,27 +1,28 @@
 //! The contacts of a whole face, from the point with its least signed distance: that point, and
-//! where the face is flat on the other body, or large, the extremes of what touches. The rules are
-//! those of `tesdf::collide::narrow::extremes`.
+//! where the face is flat on the other body, or large, the extremes of what touches.
 //!
-//! Eight directions are searched at once, then once more those out of the lines between neighbours of
-//! what was found. Four threads share a direction: they look for the farthest candidate, each among a
-//! quarter of the faces nearby.
+//! Eight directions are searched at once, then once more those out of the lines between neighbours
+//! of what was found. Four threads share a direction: they look for the farthest candidate, each
+//! among a quarter of the faces nearby.
+//!
+//! Mirrors `collide/narrow/extremes.rs` of `tesdf`.
 use cubecl::prelude::*;
 use tesdf::collide::internal;
 
-use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs, Part, PartExpand};
-use super::super::counters::{self, Counters};
-use super::super::field::locate::no_cell;
-use super::super::field::nearest::FAR;
-use super::super::field::shapes::{BOX, FACE_COUNT, Field, FieldExpand, KIND, NONE, PLANE, Shapes};
-use super::super::math::triangle::Face;
-use super::super::math::vector::{LEAST_DIVISOR, V3, pick, zero};
-use super::super::middle::items::Weights;
-use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
-use super::near::{FACES, Walk, axes_of};
-use super::piece::{Lowest, Pool};
-use super::polygon_distance::weights_of;
-use super::taken::{BETWEEN, DIRECTIONS, MINIMUM, Memory, SAME, Taken, nothing_at};
-use super::work::Work;
+use crate::kernels::counters::{self, Counters};
+use crate::kernels::detect::candidates::Weights;
+use crate::kernels::detect::ordered_pair::{OrderedPair, OrderedPairs, Part, PartExpand};
+use crate::kernels::geometry::polygon_distance::weights_of;
+use crate::kernels::geometry::triangle::Face;
+use crate::kernels::geometry::vector::{LEAST_DIVISOR, V3, pick, zero};
+use crate::kernels::narrow::contact_points::{BETWEEN, DIRECTIONS, MINIMUM, Memory, SAME, Taken, nothing_at};
+use crate::kernels::narrow::operations::Work;
+use crate::kernels::narrow::tree_walk::{FACES, Walk, axes_of};
+use crate::kernels::query::locate::no_cell;
+use crate::kernels::query::nearest::FAR;
+use crate::kernels::report::contact::{CONVERGED, Contacts, NO_CORNER, Touch};
+use crate::kernels::scene::shape::{BOX, FACE_COUNT, Field, FieldExpand, KIND, NONE, PLANE, Shapes};
+use crate::kernels::search::piece::{Lowest, Pool};
 
 /// A face is large when its longest edge exceeds this fraction of the smaller body's diagonal.
 const LARGE: f32 = internal::LARGE as f32;
@@ -200,8 +201,8 @@ impl Facing<'_> {
         Direction { s: to.dot(ab), t: to.dot(ac), above: -FAR.runtime(), below: FAR.runtime() }
     }
 
-    /// The direction out of the line between two neighbours of a patch. The corners between them stand
-    /// out from the line. Where both are the same, nothing does.
+    /// The direction out of the line between two neighbours of a patch. The corners between them
+    /// stand out from the line. Where both are the same, nothing does.
     fn out_of(self, from: V3, to: V3) -> Direction {
         let line = to - from;
         let length = line.length();
@@ -438,8 +439,8 @@ impl Facing<'_> {
         let mut to = self.direction(direction);
         // Whether this thread's direction has no extreme yet.
         let mut searches = true;
-        // First the minimum itself, then candidates in all directions, then those that stand out between
-        // two of them.
+        // First the minimum itself, then candidates in all directions, then those that stand out
+        // between two of them.
         let mut slot = MINIMUM.runtime();
         let mut round = 0u32;
         let mut rounds = 1u32;

@@ -1,11 +1,11 @@
 //! Node-TES: the signed distance at a node.
 use cubecl::prelude::*;
 
-use super::super::broad::ordered_pair::OrderedPairs;
-use super::super::counters::{Counters, POLYGONS};
-use super::super::field::shapes::Shapes;
-use super::super::middle::items::Items;
-use super::contacts::{CONVERGED, Contacts, Touch};
+use crate::kernels::counters::{Counters, POLYGONS};
+use crate::kernels::detect::candidates::Items;
+use crate::kernels::detect::ordered_pair::OrderedPairs;
+use crate::kernels::report::contact::{CONVERGED, Contacts, Touch};
+use crate::kernels::scene::shape::Shapes;
 
 /// Writes the contact of a node per thread.
 #[cube(launch, create_dummy_kernel)]
