@@ -102,10 +102,14 @@ fn the_processor_steps_over_whole_faces() {
     let scene = worlds(2, &mut Random(31));
     let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("fits");
     let device = detector.device().clone();
-    let of_instance = |pose: Pose| {
-        [&pose.translation.as_vec3().to_array()[..], &pose.rotation.as_quat().to_array()].concat()
-    };
-    let poses: Vec<f32> = scene.instances().flat_map(|(_, instance)| of_instance(instance.pose)).collect();
+    let mut rounded = scene.clone();
+    let mut poses: Vec<f32> = Vec::new();
+    for (id, instance) in scene.instances() {
+        let (translation, rotation) = (instance.pose.translation.as_vec3(), instance.pose.rotation.as_quat());
+        poses.extend(translation.to_array().iter().chain(&rotation.to_array()));
+        let pose = Pose { translation: translation.as_dvec3(), rotation: rotation.as_dquat().normalize() };
+        rounded.set_poses(&[(id, pose)]).expect("a pose");
+    }
     let poses = DeviceArray::upload(&device, &poses).expect("fits");
     let given = PoseArrays { poses: &poses, velocities: None };
     for contacts_per in [ContactsPer::Face, ContactsPer::Minimum] {
@@ -120,7 +124,8 @@ fn the_processor_steps_over_whole_faces() {
             assert!(!expected.is_empty() && contacts.as_slice() == expected.as_slice(), "{options:?}");
             let report = detector.report();
             assert!(report.launches == 0 && report.pairs_on_processor >= 4, "{report:?}");
-            for given in [None, Some(&given)] {
+            for (given, placed) in [(None, &scene), (Some(&given), &rounded)] {
+                let expected = detect(placed, &options).expect("detects");
                 let staying = detector.detect_on_device(&scene, given, &options).expect("detects");
                 are_equal(&read(&device, &staying), expected.as_slice(), 2.0, 1e-5);
                 assert_eq!(detector.report().launches, 0);
