@@ -53,6 +53,10 @@ pub enum PartFacing {
     AtCenter,
 }
 
+/// A point is at a side of a box when it is nearer to it than this part of the least half extent:
+/// less than what counts as at a side of its faces (`descent.rs`).
+const AT_SIDE: f64 = 1e-5;
+
 impl Part {
     fn new(points: &[DVec3], radius: f64) -> Self {
         let (normal, facing) = (DVec3::ZERO, PartFacing::Everywhere);
@@ -218,6 +222,22 @@ impl<'a> SurfaceBody<'a> {
             simple => Simple::from(simple).part(face).into_inner().ok()?,
         };
         Some(Triangle::new(corners.map(|p| self.to_field(p))))
+    }
+
+    /// Whether a function with this gradient (field's frame) may fall along the surface from one of
+    /// its points, by more than `slope` per unit of length. `false` is certain. Only a box knows.
+    pub fn may_fall(&self, p: DVec3, gradient: DVec3, slope: f64) -> bool {
+        let Shape::Box { half_extents: half } = *self.shape else { return true };
+        let at = self.out_of_field(p);
+        let down = -(self.linear.transpose() * gradient) / self.scale;
+        let near = AT_SIDE * half.min_element();
+        // A way in a side of the box has two components along its axes, and out of the box there is
+        // none.
+        (0..3).any(|axis| {
+            let is_at_side = half[axis] - at[axis].abs() <= near;
+            let fall = if is_at_side { -down[axis] * at[axis].signum() } else { down[axis].abs() };
+            fall > 0.5 * slope
+        })
     }
 
     /// Whether one of the other faces that share all of these corners of a face is accepted. Faces

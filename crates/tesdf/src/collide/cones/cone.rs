@@ -128,6 +128,12 @@ impl Cone {
     }
 }
 
+/// Whether a direction is in the cone of some rays, up to [`SLOPE`]. Most often it is near a ray, and
+/// the cone is not made.
+pub fn is_near(rays: impl Iterator<Item = DVec3> + Clone, direction: DVec3) -> bool {
+    rays.clone().any(|ray| ray.dot(direction) >= least_cosine()) || Cone::new(rays).is_near(direction)
+}
+
 /// A direction that is in both cones, near to `v`; `None` where none is found.
 pub fn clamped(one: &Cone, other: &Cone, v: DVec3) -> Option<DVec3> {
     let mut at = v;

@@ -22,7 +22,7 @@ use crate::collide::scene::shape::Shape;
 use crate::collide::scene::shape::least_and_most;
 use crate::query::Precision;
 use around::around;
-use cone::{Cone, Normals, PARALLEL, SAME, clamped, common, crossing, least_cosine};
+use cone::{Cone, Normals, PARALLEL, SAME, clamped, common, crossing, is_near, least_cosine};
 pub use elsewhere::{in_cones, keep_different};
 
 /// The limits of the rule, for kernels on other devices.
@@ -144,13 +144,13 @@ impl<'a> Cones<'a> {
                 }
             }
             // The plane of the face: the way to it from the nearest point of b.
-            ([m], ..) => match (Cone::new(of_b.iter().copied()).is_near(-*m), is_apart) {
+            ([m], ..) => match (is_near(of_b.iter().copied(), -*m), is_apart) {
                 (false, _) => otherwise,
                 (true, true) => self.turned(contact, -*m),
                 (true, false) => along(-*m),
             },
             (_, [h], _) => {
-                if Cone::opposite(&of_a).is_near(*h) {
+                if is_near(of_a.iter().map(|n| -*n), *h) {
                     along(*h)
                 } else {
                     keep

@@ -1,10 +1,13 @@
 //! The contacts of some faces or nodes of an ordered pair.
+use crate::collide::bodies::field::Field;
 use crate::collide::bodies::surface::Part;
+use crate::collide::detect::closed_form;
 use crate::collide::detect::ordered_pair::OrderedPair;
 use crate::collide::narrow::Minimum;
 use crate::collide::report::contact::Contact;
 use crate::geometry::Aabb;
 use crate::parallel::*;
+use crate::query::Surroundings;
 
 /// Sort key within one ordered pair of instances. Without a cell, several pieces outside the cube
 /// may have the same face, so the point decides.
@@ -65,7 +68,12 @@ pub struct Found {
 /// Middle phase, narrow phase and filters.
 pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut found = Found::default();
-    let Found { contacts, at_vertices, polygons, filtered } = &mut found;
+    if matches!(pair.field.field, Field::Simple(_)) {
+        for &candidate in candidates {
+            found.add(pair, candidate, &pair.part(candidate), None);
+        }
+        return found;
+    }
     let parts: Vec<(Part, u32, u32)> = candidates.iter().map(|&candidate| pair.part(candidate)).collect();
     let mut rest = parts.as_slice();
     let mut next = candidates.iter();
@@ -78,25 +86,45 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
             true => pair.search_of(parts()).surroundings(&pair.field, parts()),
             false => None,
         };
-        for ((part, face_a, feature), &candidate) in group.iter().zip(&mut next) {
-            let mut found = |minimum: Minimum| {
-                let (minimum, cosine) = pair.faced(part, candidate, minimum);
-                let ids = [*face_a, *feature];
-                let Ok(contact) = pair.contact(part, candidate, &minimum, cosine, ids) else {
-                    *filtered += 1;
-                    return;
-                };
-                if let Some(vertex) = pair.vertex(part, &minimum) {
-                    at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });
-                }
-                contacts.push(contact);
-            };
-            let mut polygon = |_: &_| *polygons += 1;
-            let search = pair.search_of([part]);
-            search.minima(&pair.field, part, around.as_ref(), &mut polygon, &mut |_, m| found(m));
+        for (part, &candidate) in group.iter().zip(&mut next) {
+            found.add(pair, candidate, part, around.as_ref());
         }
     }
     found
+}
+
+impl Found {
+    /// Adds the contacts of a candidate. `part` is its [`part`](OrderedPair::part), and `around` the
+    /// mesh around it, where that is known.
+    fn add(
+        &mut self,
+        pair: &OrderedPair,
+        candidate: u32,
+        (part, face, feature): &(Part, u32, u32),
+        around: Option<&Surroundings>,
+    ) {
+        let Self { contacts, at_vertices, polygons, filtered } = self;
+        let mut found = |minimum: Minimum| {
+            let (minimum, cosine) = pair.faced(part, candidate, minimum);
+            let Ok(contact) = pair.contact(part, candidate, &minimum, cosine, [*face, *feature]) else {
+                *filtered += 1;
+                return;
+            };
+            if let Some(vertex) = pair.vertex(part, &minimum) {
+                at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });
+            }
+            contacts.push(contact);
+        };
+        let search = pair.search_of([part]);
+        if let Field::Simple(simple) = pair.field.field
+            && closed_form::minima(simple, &search, pair.mode(), part, &mut found)
+        {
+            *polygons += 1;
+            return;
+        }
+        let mut polygon = |_: &_| *polygons += 1;
+        search.minima(&pair.field, part, around, &mut polygon, &mut |_, m| found(m));
+    }
 }
 
 /// Largest number of parts whose surroundings are searched together, and the largest size of their

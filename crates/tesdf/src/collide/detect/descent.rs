@@ -13,7 +13,7 @@ use crate::geometry::Triangle;
 
 /// A contact is no minimum where the distance falls by more than this per unit of length. Where it
 /// falls by less, bodies that turn by less than this angle (rad) can touch.
-const SLOPE: f64 = 0.1;
+pub const SLOPE: f64 = 0.1;
 
 /// A point that shows the fall is lower by at least this per unit of length.
 const LOWER: f64 = 0.5 * SLOPE;

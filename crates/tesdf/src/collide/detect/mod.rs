@@ -1,6 +1,7 @@
 //! Detection: the contacts of all pairs of a scene.
 pub mod candidate_contacts;
 pub mod candidates;
+mod closed_form;
 pub mod coarse;
 pub mod descent;
 pub mod hidden;

@@ -6,7 +6,7 @@ use crate::collide::bodies::field::FieldBody;
 use crate::collide::bodies::reach::Reach;
 use crate::collide::bodies::surface::{Candidates, Part, SurfaceBody};
 use crate::collide::cones::Cones;
-use crate::collide::detect::descent::{OnFace, descends};
+use crate::collide::detect::descent::{OnFace, SLOPE, descends};
 use crate::collide::mode::{ContactsPer, FaceOptions, Mode};
 use crate::collide::narrow::{Minimum, Search};
 use crate::collide::options::CollideOptions;
@@ -232,6 +232,7 @@ impl<'a> OrderedPair<'a> {
     /// lowest one by.
     pub fn descends(&self, at: &OnFace) -> bool {
         !self.is_fast
+            && self.surface.may_fall(at.point, at.gradient, SLOPE)
             && descends(&self.surface, &self.field, at, |face| {
                 let around = self.surface.around();
                 let reach = self.reach.of(&face.corners, around) + around;

@@ -1,0 +1,153 @@
+//! Minima that have a closed form: of a point in the field of a simple shape, and of a large part
+//! over a plane. They are those of the search, bit for bit.
+use glam::DVec3;
+
+use crate::collide::bodies::surface::Part;
+use crate::collide::narrow::extremes::OPPOSES;
+use crate::collide::narrow::{Minimum, Search};
+use crate::collide::options::Mode;
+use crate::collide::scene::simple::Simple;
+
+/// Finds the minima of a part that are within the reach of `search`, as [`Search::minima`] does.
+/// Returns whether there is a closed form; if not, nothing is found.
+pub fn minima(
+    simple: Simple,
+    search: &Search,
+    mode: Mode,
+    part: &Part,
+    found: &mut impl FnMut(Minimum),
+) -> bool {
+    let reach = search.reach + part.radius;
+    match (part.points(), simple) {
+        (&[point], _) => {
+            let minimum = at(simple, part, point, true);
+            if minimum.value.distance <= reach {
+                found(minimum);
+            }
+            true
+        }
+        (_, Simple::Plane) if search.is_of_faces() && mode == Mode::Exact && search.is_large(part) => {
+            over_plane(part, reach, found)
+        }
+        _ => false,
+    }
+}
+
+/// The minima of a large segment or triangle over the plane z = 0: its lowest point, and its other
+/// corners within reach if it looks at the plane.
+fn over_plane(part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool {
+    let points = part.points();
+    let is_triangle = points.len() == 3;
+    if is_triangle && part.normal == DVec3::ZERO {
+        return false;
+    }
+    // The search looks at the centre, too. Where a part is flat on the plane, that may be lower by
+    // rounding.
+    let center = (points[0] + points[1] + points[points.len() - 1]) / 3.0;
+    let lower = |p: DVec3, q: DVec3| if q.z < p.z { q } else { p };
+    let lowest = points[1..].iter().chain([&center]).fold(points[0], |p, q| lower(p, *q));
+    // A normal of a triangle turns away from the plane, or lies in it: then no corner is an extreme.
+    let has_extremes = !is_triangle || part.normal.z < OPPOSES;
+    // The search moves a corner that is out of reach inwards.
+    if is_triangle && has_extremes && points.iter().any(|p| p.z > reach) {
+        return false;
+    }
+    if lowest.z <= reach {
+        found(at(Simple::Plane, part, lowest, true));
+        let extremes = points.iter().filter(|p| has_extremes && **p != lowest && p.z <= reach);
+        extremes.for_each(|p| found(at(Simple::Plane, part, *p, false)));
+    }
+    true
+}
+
+fn at(simple: Simple, part: &Part, point: DVec3, is_lowest: bool) -> Minimum {
+    let corner = part.points().iter().position(|p| *p == point).map(|k| k as u8);
+    Minimum { point, value: simple.value(point), cell: None, converged: true, corner, is_lowest }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use glam::DQuat;
+
+    use super::*;
+    use crate::collide::detect::ordered_pair::OrderedPair;
+    use crate::collide::options::{CollideOptions, ContactsPer};
+    use crate::collide::scene::pose::Pose;
+    use crate::collide::scene::shape::Shape;
+    use crate::collide::scene::{Instance, Scene};
+
+    /// A number from 0 to 1 that a number of a sequence gives.
+    fn random(k: &mut u64) -> f64 {
+        *k = k.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (*k >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    type Bits = ([u64; 8], Option<u8>, bool, bool);
+
+    /// All numbers of a minimum, which an order of the minima of a part may depend on.
+    fn bits(m: &Minimum) -> Bits {
+        let [p, n] = [m.point, m.value.gradient].map(|v| v.to_array());
+        let all = [p[0], p[1], p[2], n[0], n[1], n[2], m.value.distance, m.value.closest_point.z];
+        // Zeros of both signs are equal.
+        (all.map(|x| (x + 0.0).to_bits()), m.corner, m.is_lowest, m.converged)
+    }
+
+    #[test]
+    fn closed_forms_are_the_minima_of_the_search() {
+        let mut k = 1;
+        let (mut closed, mut searched, mut contacts) = (0, 0, 0);
+        for case in 0..3000 {
+            let mut size = || 0.2 + random(&mut k);
+            let shapes = [
+                Shape::Box { half_extents: DVec3::new(size(), size(), size()) },
+                Shape::Sphere { radius: size() },
+                Shape::Capsule { half_height: size(), radius: size() },
+            ];
+            let (shape, field) =
+                (&shapes[case % 3], [Shape::Plane, shapes[case / 3 % 3].clone()][case / 9 % 2].clone());
+            let mut number = || random(&mut k);
+            let axis = DVec3::new(number(), number(), number()) - 0.5;
+            // Some lie flat, some nearly.
+            let angle = [0.0, 0.25 * TAU, 1e-9 * number(), 0.1 * number(), TAU * number()][case % 5];
+            let tilt = DQuat::from_axis_angle(if case % 2 == 0 { DVec3::X } else { axis.normalize() }, angle);
+            let pose = Pose { rotation: tilt, translation: DVec3::new(number(), number(), 1.4 * number()) };
+            let turned = DQuat::from_axis_angle(axis.normalize(), if case % 4 == 0 { 1.0 } else { 0.0 });
+            let world = Pose { rotation: turned, translation: axis };
+            let mut scene = Scene::new();
+            let ids = [(shape.clone(), world.after(pose)), (field.clone(), world)].map(|(shape, pose)| {
+                let shape = scene.add_shape(shape).expect("valid sizes");
+                scene.add(Instance::new(shape, pose)).expect("a valid pose")
+            });
+            let (mode, contacts_per) = match case % 7 {
+                0 => (Mode::Node, ContactsPer::Face),
+                1 => (Mode::Exact, ContactsPer::Face),
+                2 => (Mode::Exact, ContactsPer::Cell),
+                3 => (Mode::Face, ContactsPer::Minimum),
+                _ => (Mode::Exact, ContactsPer::Minimum),
+            };
+            let options =
+                CollideOptions { mode, contacts_per, contact_distance: 0.2, ..CollideOptions::default() };
+            let pair =
+                OrderedPair::new(&scene, &options, ids[0], ids[1], 0.2).expect("instances of the scene");
+            let simple = Simple::from(&field);
+            for candidate in pair.candidates() {
+                let (part, ..) = pair.part(candidate);
+                let search = pair.search_of([&part]);
+                let (mut found, mut expected) = (Vec::new(), Vec::new());
+                if !minima(simple, &search, mode, &part, &mut |m| found.push(bits(&m))) {
+                    assert!(found.is_empty());
+                    searched += 1;
+                    continue;
+                }
+                search.minima(&pair.field, &part, None, &mut |_| (), &mut |_, m| expected.push(bits(&m)));
+                found.sort_unstable();
+                expected.sort_unstable();
+                assert_eq!(found, expected, "case {case}, part {candidate}");
+                (closed, contacts) = (closed + 1, contacts + found.len());
+            }
+        }
+        assert!(closed > 5000 && searched > 500 && contacts > 1500, "{closed} {searched} {contacts}");
+    }
+}
