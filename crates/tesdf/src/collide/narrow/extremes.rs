@@ -8,6 +8,8 @@
 //! A patch between plane faces is a polygon. Its corners are corners of the face, corners of the
 //! other body's faces over it, or crossings of edges of both. These points are the candidates. A
 //! candidate is taken when the field there is within the limit and opposes the face.
+use std::cell::RefCell;
+
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
@@ -91,8 +93,24 @@ struct Candidate {
     point: DVec3,
     /// The corner of the part that it is, if it is one.
     corner: Option<u8>,
-    /// Its contact, or that it has none, once this is known.
-    taken: Option<Option<Minimum>>,
+    taken: Taken,
+}
+
+/// What is known of the contact of a candidate.
+#[derive(Clone, Copy)]
+enum Taken {
+    Unknown,
+    /// There is none.
+    Never,
+    /// Its index among the contacts.
+    Contact(usize),
+}
+
+/// The candidates of a patch, and the contacts of some of them.
+#[derive(Default)]
+struct Candidates {
+    all: Vec<Candidate>,
+    contacts: Vec<Minimum>,
 }
 
 impl<'a> Patch<'a> {
@@ -128,15 +146,24 @@ impl<'a> Patch<'a> {
 
     /// Points of the patch other than the minimum: its corners, at most [`MOST`].
     pub fn extremes(mut self) -> ArrayVec<Minimum, MOST> {
-        let mut found = ArrayVec::<Minimum, MOST>::new();
+        thread_local! {
+            static CANDIDATES: RefCell<Candidates> = RefCell::default();
+        }
         if self.part.points().len() < 2 || !(self.is_large || self.may_be_flat()) {
-            return found;
+            return ArrayVec::new();
         }
         self.sides = sides(self.part);
-        let mut candidates = self.candidates();
-        candidates.retain(|candidate| self.may_hold(candidate.point));
+        CANDIDATES.with_borrow_mut(|candidates| self.extremes_of(candidates))
+    }
+
+    /// The same, with memory for the candidates.
+    fn extremes_of(&self, candidates: &mut Candidates) -> ArrayVec<Minimum, MOST> {
+        let mut found = ArrayVec::<Minimum, MOST>::new();
+        candidates.contacts.clear();
+        self.find(&mut candidates.all);
+        candidates.all.retain(|candidate| self.may_hold(candidate.point));
         for direction in self.directions() {
-            let Some(extreme) = self.farthest(direction, f64::NEG_INFINITY, &mut candidates) else {
+            let Some(extreme) = self.farthest(direction, f64::NEG_INFINITY, candidates) else {
                 continue;
             };
             if found.iter().all(|other| other.point != extreme.point) {
@@ -151,7 +178,7 @@ impl<'a> Patch<'a> {
         while is_area && k < found.len() && !found.is_full() {
             let (from, to) = (found[k].point, found[(k + 1) % found.len()].point);
             let outward = (to - from).cross(self.normal).normalize_or_zero();
-            match self.farthest(outward, outward.dot(from) + stands_out, &mut candidates) {
+            match self.farthest(outward, outward.dot(from) + stands_out, candidates) {
                 Some(corner) if found.iter().all(|other| other.point != corner.point) => {
                     found.insert(k + 1, corner);
                 }
@@ -244,27 +271,34 @@ impl<'a> Patch<'a> {
 
     /// The contact of the candidate that is farthest along a direction among those that have one, if
     /// it is farther than `least`. Removes candidates that have none.
-    fn farthest(&self, direction: DVec3, least: f64, candidates: &mut Vec<Candidate>) -> Option<Minimum> {
+    fn farthest(&self, direction: DVec3, least: f64, candidates: &mut Candidates) -> Option<Minimum> {
+        let Candidates { all, contacts } = candidates;
         let mut limit = f64::INFINITY;
         for _ in 0..TRIALS {
             let mut next: Option<(f64, usize)> = None;
-            for (i, candidate) in candidates.iter().enumerate() {
+            for (i, candidate) in all.iter().enumerate() {
                 let at = direction.dot(candidate.point);
                 if at > least && at < limit && next.is_none_or(|(best, _)| at > best) {
                     next = Some((at, i));
                 }
             }
             let (at, i) = next?;
-            let Candidate { point, corner, taken } = candidates[i];
-            let taken = taken.unwrap_or_else(|| self.take(point, corner));
-            if taken.is_some() {
-                candidates[i].taken = Some(taken);
-                return taken;
+            let Candidate { point, corner, taken } = all[i];
+            match taken {
+                Taken::Contact(index) => return contacts.get(index).copied(),
+                Taken::Unknown => {
+                    if let Some(taken) = self.take(point, corner) {
+                        all[i].taken = Taken::Contact(contacts.len());
+                        contacts.push(taken);
+                        return Some(taken);
+                    }
+                }
+                Taken::Never => {}
             }
-            candidates.remove(i);
+            all.remove(i);
             // Faces that share a corner have offered it, too.
-            let same = candidates.iter_mut().filter(|candidate| candidate.point == point);
-            same.for_each(|candidate| candidate.taken = Some(None));
+            let same = all.iter_mut().filter(|candidate| candidate.point == point);
+            same.for_each(|candidate| candidate.taken = Taken::Never);
             limit = at;
         }
         None
@@ -348,12 +382,13 @@ impl<'a> Patch<'a> {
         self.sides.iter().all(|side| side.inward.dot(p - side.start) >= side.least)
     }
 
-    /// Corners of the overlay of the part and the faces of the other body near it.
-    fn candidates(&self) -> Vec<Candidate> {
+    /// Finds the corners of the overlay of the part and the faces of the other body near it.
+    fn find(&self, candidates: &mut Vec<Candidate>) {
         let corner = |point: DVec3| self.part.points().iter().position(|p| *p == point).map(|k| k as u8);
-        let own = |&point: &DVec3| Candidate { point, corner: corner(point), taken: None };
-        let mut candidates: Vec<Candidate> = self.within.iter().map(own).collect();
-        let mut offer = |point| candidates.push(Candidate { point, corner: None, taken: None });
+        let taken = Taken::Unknown;
+        candidates.clear();
+        candidates.extend(self.within.iter().map(|&point| Candidate { point, corner: corner(point), taken }));
+        let mut offer = |point| candidates.push(Candidate { point, corner: None, taken });
         match *self.field {
             CellField::Whole(around) => {
                 // Faces of the patch are as near as its points.
@@ -366,6 +401,12 @@ impl<'a> Patch<'a> {
             // A cell is not searched for extremes.
             CellField::Mesh { .. } => {}
             CellField::Simple(simple) => {
+                // Faces that share a corner offer it once: a box has few.
+                let mut offer = |point| {
+                    if candidates.iter().all(|candidate| candidate.point != point) {
+                        candidates.push(Candidate { point, corner: None, taken });
+                    }
+                };
                 for points in simple.parts() {
                     match points[..] {
                         [a, b, c] => self.overlay(&Triangle::new([a, b, c]), f64::INFINITY, &mut offer),
@@ -376,7 +417,6 @@ impl<'a> Patch<'a> {
                 }
             }
         }
-        candidates
     }
 
     /// Offers the corners of the overlay of the part and a face of the other body, as far as the
