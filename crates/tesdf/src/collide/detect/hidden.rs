@@ -27,6 +27,7 @@ use crate::collide::scene::Scene;
 use crate::collide::scene::error::CollideError;
 use crate::collide::scene::field_value::FieldValue;
 use crate::collide::scene::ids::InstanceId;
+use crate::collide::search::longest_edge::longest_edge;
 use crate::collide::search::queue::Queue;
 use crate::geometry::Aabb;
 use crate::query::corner_reach;
@@ -244,7 +245,8 @@ impl Looks<'_> {
                 break;
             }
             let before = self.looks;
-            let wave: Vec<Piece> = std::iter::from_fn(|| open.pop()).take(WAVE).collect();
+            let wave: Vec<Piece> =
+                std::iter::from_fn(|| open.pop()).take(WAVE).map(|(_, piece)| piece).collect();
             self.look(wave.into_iter().flat_map(Piece::halves).collect(), &mut open);
             if !is_sure {
                 fine += self.looks - before;
@@ -289,16 +291,11 @@ impl Piece {
         Self { corners, radius }
     }
 
-    /// The halves, divided in the middle of the longest side. Quarters of a needle would be as
-    /// slender, and many more.
-    fn halves(self) -> [Self; 2] {
+    /// The halves, divided in the middle of the longest edge.
+    fn halves(mut self) -> [Self; 2] {
+        let start = longest_edge(self.corners);
+        self.corners.rotate_left(start);
         let [a, b, c] = self.corners;
-        let (ab, bc, ca) = (a.distance_squared(b), b.distance_squared(c), c.distance_squared(a));
-        let [a, b, c] = match () {
-            () if ab >= bc && ab >= ca => [a, b, c],
-            () if bc >= ca => [b, c, a],
-            () => [c, a, b],
-        };
         let middle = 0.5 * (a + b);
         [[a, middle, c], [middle, b, c]].map(|corners| Self { corners, ..self })
     }

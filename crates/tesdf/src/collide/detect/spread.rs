@@ -175,7 +175,7 @@ fn regions(orders: &[OrderedPair], count: usize) -> Vec<Region> {
     }
     let mut leaves = Vec::new();
     while open.len() + leaves.len() < count
-        && let Some(largest) = open.pop()
+        && let Some((_, largest)) = open.pop()
     {
         let Region { order, child, bound, .. } = largest;
         match child {
@@ -198,7 +198,7 @@ fn dive(pair: &OrderedPair, region: &Region) -> Dive {
     open.push(middle(region), *region);
     while leaves < LEAVES
         && dive.found.contacts.is_empty()
-        && let Some(Region { order, child, bound, .. }) = open.pop()
+        && let Some((_, Region { order, child, bound, .. })) = open.pop()
     {
         match child {
             TreeChild::Node(node) => {

@@ -1,7 +1,6 @@
 //! The least signed distance over a polygon inside the solid: the depth is a minimum of convex
 //! functions, and its maximum is sought.
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 use glam::DVec3;
@@ -12,6 +11,8 @@ use crate::collide::bodies::field::{CellField, ROUNDING};
 use crate::collide::bodies::polygon::{MAX_VERTICES, Polygon};
 use crate::collide::scene::field_value::FieldValue;
 use crate::collide::search::greatest_minimum::{self, CORNERS, summit};
+use crate::collide::search::longest_edge::longest_edge;
+use crate::collide::search::queue::Queue;
 use crate::geometry::Triangle;
 use crate::query::{Precision, Surroundings};
 
@@ -35,24 +36,6 @@ pub struct Piece {
     pub center: FieldValue,
 }
 
-impl PartialEq for Piece {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Piece {}
-impl PartialOrd for Piece {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Piece {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // The heap returns the lowest bound first.
-        other.bound.total_cmp(&self.bound)
-    }
-}
-
 /// The point with the least signed distance, within `tolerance`, if that distance is at most
 /// `reach`. Otherwise the result is only the lowest point seen.
 pub fn branch_and_bound(
@@ -64,22 +47,14 @@ pub fn branch_and_bound(
 ) -> Lowest {
     let mut search = Branches::new(cell, polygon, precision, tolerance, reach);
     let corners = search.corners(polygon);
-    let mut open: BinaryHeap<Piece> = triangles(&corners).map(|corners| search.piece(corners)).collect();
-    while let Some(piece) = open.pop() {
-        if !search.is_open(piece.bound) {
-            break;
-        }
-        if search.evaluations > MAX_EVALUATIONS {
-            return Lowest { point: search.best.1, converged: false, face: None };
-        }
+    let mut open = Queue::new();
+    triangles(&corners).for_each(|corners| search.push(corners, &mut open, |piece| piece));
+    let converged = search.run(&mut open, |search, piece, open| {
         for part in search.parts(&piece) {
-            let piece = search.piece(part);
-            if search.is_open(piece.bound) {
-                open.push(piece);
-            }
+            search.push(part, open, |piece| piece);
         }
-    }
-    Lowest { point: search.best.1, converged: true, face: None }
+    });
+    Lowest { point: search.best.1, converged, face: None }
 }
 
 /// Whether `best`, the signed distance at a point of the polygon and its nearest face, is the least
@@ -173,6 +148,34 @@ impl<'a> Branches<'a> {
         bound < self.best.0 - self.tolerance && bound <= self.reach && self.best.0 >= self.enough
     }
 
+    /// Adds a triangle to a queue, as the item of its piece, if it can still improve the result.
+    pub fn push<T>(&mut self, corners: [Corner; 3], open: &mut Queue<T>, item: impl Fn(Piece) -> T) {
+        let piece = self.piece(corners);
+        if self.is_open(piece.bound) {
+            open.push(piece.bound, item(piece));
+        }
+    }
+
+    /// Searches all parts that can improve the result; `expand` replaces a part by smaller ones.
+    /// Returns whether the search was not cut short.
+    pub fn run<T>(
+        &mut self,
+        open: &mut Queue<T>,
+        mut expand: impl FnMut(&mut Self, T, &mut Queue<T>),
+    ) -> bool {
+        let converged = open.search(|open, bound, part| {
+            if !self.is_open(bound) {
+                return ControlFlow::Break(true);
+            }
+            if self.evaluations > MAX_EVALUATIONS {
+                return ControlFlow::Break(false);
+            }
+            expand(self, part, open);
+            ControlFlow::Continue(())
+        });
+        converged.unwrap_or(true)
+    }
+
     /// Divides a triangle, along a side of the face nearest to its centre where that helps.
     pub fn parts(&mut self, piece: &Piece) -> ArrayVec<[Corner; 3], 3> {
         self.along_side(piece).unwrap_or_else(|| self.halves(piece.corners).into_iter().collect())
@@ -217,16 +220,10 @@ impl<'a> Branches<'a> {
     }
 
     /// Halves the longest edge.
-    fn halves(&mut self, [a, b, c]: [Corner; 3]) -> [[Corner; 3]; 2] {
-        let edge = |p: Corner, q: Corner| p.point.distance_squared(q.point);
-        let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
-        let [a, b, c] = if ab >= bc && ab >= ca {
-            [a, b, c]
-        } else if bc >= ca {
-            [b, c, a]
-        } else {
-            [c, a, b]
-        };
+    fn halves(&mut self, mut corners: [Corner; 3]) -> [[Corner; 3]; 2] {
+        let start = longest_edge(corners.map(|c| c.point));
+        corners.rotate_left(start);
+        let [a, b, c] = corners;
         let m = self.corner(0.5 * (a.point + b.point));
         [[a, m, c], [m, b, c]]
     }

@@ -9,7 +9,7 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::Lowest;
-use super::branch_and_bound::{Branches, Corner, MAX_EVALUATIONS, Piece, branch_and_bound, triangles};
+use super::branch_and_bound::{Branches, Corner, Piece, branch_and_bound, triangles};
 use super::exact::{CLEAR, Query};
 use crate::collide::bodies::field::{CellField, ROUNDING};
 use crate::collide::bodies::jump::{Side, side};
@@ -78,11 +78,12 @@ pub(super) fn lowest(
     if distance.is_finite() {
         branches.value(point);
     }
-    let mut search = Search { jump, query, branches, open: Queue::new(), tolerance };
+    let search = Search { jump, query, tolerance };
     let known = if is_clear { Known::Clear } else { Known::Nothing };
-    search.push(polygon, known);
-    let converged = search.run();
-    let (least, at) = search.branches.best;
+    let mut open = Queue::new();
+    push(polygon, known, &mut branches, &mut open);
+    let converged = branches.run(&mut open, |branches, part, open| search.look(part, branches, open));
+    let (least, at) = branches.best;
     // Where nothing is inside, the nearest point of the faces is the lowest.
     let face = face.filter(|_| least > CLEAR && at == point);
     least.is_finite().then_some(Lowest { point: at, converged, face })
@@ -91,42 +92,20 @@ pub(super) fn lowest(
 struct Search<'a> {
     jump: &'a GeneralizedWinding,
     query: Query<'a>,
-    branches: Branches<'a>,
-    open: Queue<Open>,
     tolerance: f64,
 }
 
+/// Adds the triangles of a polygon to a queue.
+fn push(polygon: &Polygon, known: Known, branches: &mut Branches, open: &mut Queue<Open>) {
+    if polygon.vertices().len() > 1 {
+        let corners = branches.corners(polygon);
+        triangles(&corners).for_each(|corners| branches.push(corners, open, |piece| Open { piece, known }));
+    }
+}
+
 impl Search<'_> {
-    fn push(&mut self, polygon: &Polygon, known: Known) {
-        if polygon.vertices().len() > 1 {
-            let corners = self.branches.corners(polygon);
-            triangles(&corners).for_each(|corners| self.push_triangle(corners, known));
-        }
-    }
-
-    fn push_triangle(&mut self, corners: [Corner; 3], known: Known) {
-        let piece = self.branches.piece(corners);
-        if self.branches.is_open(piece.bound) {
-            self.open.push(piece.bound, Open { piece, known });
-        }
-    }
-
-    /// Searches all parts that can be lower. Returns whether it was not cut short.
-    fn run(&mut self) -> bool {
-        while let Some(open) = self.open.pop() {
-            if !self.branches.is_open(open.piece.bound) {
-                break;
-            }
-            if self.branches.evaluations > MAX_EVALUATIONS {
-                return false;
-            }
-            self.look(open);
-        }
-        true
-    }
-
-    fn look(&mut self, Open { piece, mut known }: Open) {
-        self.branches.evaluations += 1;
+    fn look(&self, Open { piece, mut known }: Open, branches: &mut Branches, open: &mut Queue<Open>) {
+        branches.evaluations += 1;
         let points = piece.corners.map(|c| c.point);
         let center = points.iter().sum::<DVec3>() / 3.0;
         let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
@@ -135,21 +114,21 @@ impl Search<'_> {
             if piece.center.distance.abs() <= radius + 2.0 * ROUNDING
                 && let Some((above, below)) = self.query.with_polygon(&polygon).cut()
             {
-                [above, below].iter().for_each(|part| self.push(part, Known::Nothing));
+                [above, below].iter().for_each(|part| push(part, Known::Nothing, branches, open));
                 return;
             }
             known = Known::Clear;
         }
         let mut rest = None;
         if known == Known::Clear {
-            match self.off_faces(&piece, center).map_or(Side::Unknown, |from| side(self.jump, &points, from))
-            {
+            let from = off_faces(&piece, center, branches);
+            match from.map_or(Side::Unknown, |from| side(self.jump, &points, from)) {
                 Side::Outside => return,
                 Side::Inside => known = Known::Inside,
                 Side::Across(cut) => {
                     // How deep the part is that is certainly inside.
                     if let Parts::Across(inner, _) = polygon.cut(|v| cut.inner(v.point)) {
-                        self.branches.corners(&inner);
+                        branches.corners(&inner);
                     }
                     // Corners beside the cut are on it. Otherwise slivers would remain, cut after
                     // cut. Nothing but the outside is cut off: the cut lies farther out by as much.
@@ -171,37 +150,37 @@ impl Search<'_> {
             return;
         }
         // Also after a cut, so that parts get smaller.
-        let halve = |search: &mut Self, piece: &Piece| {
-            for part in search.branches.parts(piece) {
-                search.push_triangle(part, known);
+        let mut halve = |piece: &Piece, branches: &mut Branches| {
+            for part in branches.parts(piece) {
+                branches.push(part, open, |piece| Open { piece, known });
             }
         };
         match rest {
-            None => halve(self, &piece),
+            None => halve(&piece, branches),
             Some(kept) if kept.vertices().len() > 1 => {
                 let known_at = |p: DVec3| piece.corners.iter().find(|c| c.point == p).copied();
                 let corners: ArrayVec<Corner, MAX_VERTICES> =
-                    kept.points().map(|p| known_at(p).unwrap_or_else(|| self.branches.corner(p))).collect();
+                    kept.points().map(|p| known_at(p).unwrap_or_else(|| branches.corner(p))).collect();
                 for corners in triangles(&corners) {
-                    let piece = self.branches.piece(corners);
-                    if self.branches.is_open(piece.bound) {
-                        halve(self, &piece);
+                    let piece = branches.piece(corners);
+                    if branches.is_open(piece.bound) {
+                        halve(&piece, branches);
                     }
                 }
             }
             Some(_) => {}
         }
     }
+}
 
-    /// The point of a part, its centre or a corner, that is farthest from the faces; `None` where
-    /// all of them are on faces, up to rounding.
-    fn off_faces(&mut self, piece: &Piece, center: DVec3) -> Option<DVec3> {
-        let corners = piece.corners.iter().map(|c| (c.value.distance.abs(), c.point));
-        let first = (piece.center.distance.abs(), center);
-        let (distance, at) = corners.fold(first, |best, next| if next.0 > best.0 { next } else { best });
-        let is_off = distance > 4.0 * ROUNDING || self.branches.exact(at).distance.abs() > 4.0 * CLEAR;
-        is_off.then_some(at)
-    }
+/// The point of a part, its centre or a corner, that is farthest from the faces; `None` where all
+/// of them are on faces, up to rounding.
+fn off_faces(piece: &Piece, center: DVec3, branches: &Branches) -> Option<DVec3> {
+    let corners = piece.corners.iter().map(|c| (c.value.distance.abs(), c.point));
+    let first = (piece.center.distance.abs(), center);
+    let (distance, at) = corners.fold(first, |best, next| if next.0 > best.0 { next } else { best });
+    let is_off = distance > 4.0 * ROUNDING || branches.exact(at).distance.abs() > 4.0 * CLEAR;
+    is_off.then_some(at)
 }
 
 /// The polygon of a triangle, which may be a segment.

@@ -41,8 +41,6 @@ pub struct Least {
 
 /// A part of a surface that is still to be searched.
 struct Open {
-    /// Lower bound of the signed distances on it, in the world's unit.
-    bound: f64,
     order: usize,
     item: Item,
 }
@@ -103,6 +101,7 @@ struct Search<'a> {
     below: f64,
     /// The lowest signed distance, in the world's unit, its order and its point.
     best: Option<(f64, usize, Lowest)>,
+    /// The bounds are lower bounds of the signed distances, in the world's unit.
     open: Queue<Open>,
     /// Roots of orders that are searched later.
     waiting: Vec<usize>,
@@ -140,12 +139,12 @@ impl<'a> Search<'a> {
             if parts > max_parts {
                 // Nothing is known about surfaces that wait.
                 let waiting = if self.waiting.is_empty() { f64::INFINITY } else { f64::NEG_INFINITY };
-                bound = batch.iter().map(|open| open.bound).fold(waiting, f64::min);
+                bound = batch.iter().map(|(bound, _)| *bound).fold(waiting, f64::min);
                 break;
             }
             let found: Vec<Found> = match batch.len() {
-                ..FEW => batch.into_iter().map(|open| self.search(open)).collect(),
-                _ => batch.into_par_iter().map(|open| self.search(open)).collect(),
+                ..FEW => batch.into_iter().map(|(bound, open)| self.search(bound, open)).collect(),
+                _ => batch.into_par_iter().map(|(bound, open)| self.search(bound, open)).collect(),
             };
             found.into_iter().for_each(|found| self.take(found));
         }
@@ -174,18 +173,18 @@ impl<'a> Search<'a> {
     }
 
     fn push(&mut self, bound: f64, order: usize, item: Item) {
-        self.open.push(bound, Open { bound, order, item });
+        self.open.push(bound, Open { order, item });
     }
 
-    /// The parts that are searched next.
-    fn batch(&mut self) -> Vec<Open> {
+    /// The parts that are searched next, with their bounds.
+    fn batch(&mut self) -> Vec<(f64, Open)> {
         let size = (self.open.len() / SHARE).clamp(1, BATCH);
         let mut batch = Vec::with_capacity(size);
         while batch.len() < size
-            && let Some(open) = self.open.pop()
+            && let Some((bound, open)) = self.open.pop()
         {
-            if open.bound < self.least() - self.tolerance && open.bound <= self.limit(open.order) {
-                batch.push(open);
+            if bound < self.least() - self.tolerance && bound <= self.limit(open.order) {
+                batch.push((bound, open));
             }
         }
         batch
@@ -227,8 +226,7 @@ impl<'a> Search<'a> {
     }
 
     /// Searches a part.
-    fn search(&self, open: Open) -> Found {
-        let Open { bound, order, item } = open;
+    fn search(&self, bound: f64, Open { order, item }: Open) -> Found {
         let Order { surface, field } = &self.orders[order];
         let (mut looks, mut found) = (self.looks(order), Vec::new());
         let bound = bound / field.unit();

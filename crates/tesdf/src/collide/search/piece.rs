@@ -8,6 +8,7 @@ use crate::collide::bodies::polygon::{Parts, Polygon};
 use crate::collide::bodies::surface::Part;
 use crate::collide::scene::field_value::FieldValue;
 use crate::collide::search::depth_bounds::{Bound, DepthBounds, Kind};
+use crate::collide::search::longest_edge::longest_edge;
 use crate::geometry::{Feature, GeneralizedWinding, Triangle, polygon_to_triangle};
 
 /// A part of a face, or of the core of a rounded shape, in the field's frame.
@@ -140,13 +141,7 @@ impl Piece {
 
     /// The halves, divided in the middle of the longest edge.
     fn halves(&self, field: &FieldBody, hair: f64) -> Vec<Self> {
-        let edge = |i: usize, j: usize| self.corners[i].distance_squared(self.corners[j]);
-        let (ab, bc, ca) = (edge(0, 1), edge(1, 2), edge(2, 0));
-        let k = match () {
-            () if self.count < 3 || (ab >= bc && ab >= ca) => 0,
-            () if bc >= ca => 1,
-            () => 2,
-        };
+        let k = if self.count < 3 { 0 } else { longest_edge(self.corners) };
         let l = (k + 1) % 3;
         let middle = 0.5 * (self.corners[k] + self.corners[l]);
         let half = |moved: usize| {

@@ -1,5 +1,7 @@
 //! The time at which the surfaces of two moving bodies first come together, by a best-first search
 //! over pairs of parts of them.
+use std::ops::ControlFlow;
+
 use crate::collide::search::queue::Queue;
 use crate::collide::time_of_impact::moving::{MovingBody, Part};
 use crate::collide::time_of_impact::parting::PairAt;
@@ -37,10 +39,9 @@ pub struct Limits {
     pub steps: u32,
 }
 
-/// A pair of parts that is free up to its place in the queue.
+/// A pair of parts. Its bound in the queue is the time up to which it is free.
 #[derive(Clone, Copy, Debug)]
 struct Open {
-    time: f64,
     parts: [Part; 2],
     steps: u32,
 }
@@ -59,11 +60,11 @@ const SHARE: f64 = 0.25;
 pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
     let mut open = Queue::new();
     let whole = [bodies[0].whole(), bodies[1].whole()];
-    open.push(0.0, Open { time: 0.0, parts: whole, steps: 0 });
+    open.push(0.0, Open { parts: whole, steps: 0 });
     let radius = bodies[0].radius + bodies[1].radius;
     let (mut looks, mut most) = (0, 0);
-    while let Some(Open { time, parts, steps }) = open.pop() {
-        let end = |outcome| FirstTouch { outcome, steps: most.max(steps) };
+    let touch = open.search(|open, time, Open { parts, steps }| {
+        let end = |outcome| ControlFlow::Break(FirstTouch { outcome, steps: most.max(steps) });
         looks += 1;
         if looks > MAX_LOOKS {
             return end(Outcome::Unknown(time));
@@ -78,7 +79,7 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
         let next = time + found.free;
         if next > limits.end {
             most = most.max(steps);
-            continue;
+            return ControlFlow::Continue(());
         }
         let size = places[0].reach() + places[1].reach();
         if are_faces || found.way >= SHARE * size {
@@ -86,8 +87,8 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
             if steps == limits.steps || next.is_nan() || next <= time {
                 return end(Outcome::Unknown(time));
             }
-            open.push(next, Open { time: next, parts, steps: steps + 1 });
-            continue;
+            open.push(next, Open { parts, steps: steps + 1 });
+            return ControlFlow::Continue(());
         }
         let is_first = match parts {
             [Part::Face(_), _] => false,
@@ -97,8 +98,9 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
         let next = next.max(time);
         for part in bodies[usize::from(!is_first)].parts_of(parts[usize::from(!is_first)]) {
             let parts = if is_first { [part, parts[1]] } else { [parts[0], part] };
-            open.push(next, Open { time: next, parts, steps });
+            open.push(next, Open { parts, steps });
         }
-    }
-    FirstTouch { outcome: Outcome::Free, steps: most }
+        ControlFlow::Continue(())
+    });
+    touch.unwrap_or(FirstTouch { outcome: Outcome::Free, steps: most })
 }
