@@ -34,6 +34,8 @@ pub struct Piece {
     pub corners: [Corner; 3],
     /// The value at the centre.
     pub center: FieldValue,
+    /// The edge at which it is halved, by the corner at which that starts.
+    edge: usize,
 }
 
 /// The point with the least signed distance, within `tolerance`, if that distance is at most
@@ -178,7 +180,7 @@ impl<'a> Branches<'a> {
 
     /// Divides a triangle, along a side of the face nearest to its centre where that helps.
     pub fn parts(&mut self, piece: &Piece) -> ArrayVec<[Corner; 3], 3> {
-        self.along_side(piece).unwrap_or_else(|| self.halves(piece.corners).into_iter().collect())
+        self.along_side(piece).unwrap_or_else(|| self.halves(piece).into_iter().collect())
     }
 
     /// Cuts a triangle near the surface where it leaves the space over the nearest face. The
@@ -219,10 +221,10 @@ impl<'a> Branches<'a> {
         Some([[a, ab, ac], [ab, b, c], [ab, c, ac]].into_iter().collect())
     }
 
-    /// Halves the longest edge.
-    fn halves(&mut self, mut corners: [Corner; 3]) -> [[Corner; 3]; 2] {
-        let start = longest_edge(corners.map(|c| c.point));
-        corners.rotate_left(start);
+    /// Halves an edge.
+    fn halves(&mut self, piece: &Piece) -> [[Corner; 3]; 2] {
+        let mut corners = piece.corners;
+        corners.rotate_left(piece.edge);
         let [a, b, c] = corners;
         let m = self.corner(0.5 * (a.point + b.point));
         [[a, m, c], [m, b, c]]
@@ -239,6 +241,7 @@ impl<'a> Branches<'a> {
             true => -(value.distance.abs() + 2.0 * ROUNDING) - radius,
             false => value.distance - radius,
         };
+        let mut edge = None;
         match *self.cell {
             CellField::Mesh { asset, .. } | CellField::Whole(&Surroundings { asset, .. }) => {
                 let triangle = |face: u32| asset.local_triangle(face as usize);
@@ -261,8 +264,12 @@ impl<'a> Branches<'a> {
                             cuts.add(face, distances(&triangle(face)), CORNERS[0]);
                         }
                     }
-                    bound =
-                        bound.max(self.bound_by_faces(&mut cuts, points, |face| distances(&triangle(face))));
+                    let distances = |face| distances(&triangle(face));
+                    let (least, at) = self.bound_by_faces(&mut cuts, points, distances);
+                    bound = bound.max(least);
+                    if self.is_open(bound) {
+                        edge = cuts.curved_edge(asset, points, at, self.tolerance);
+                    }
                 }
             }
             // A convex function lies above its tangents.
@@ -277,21 +284,22 @@ impl<'a> Branches<'a> {
                 }
             }
         }
-        Piece { bound, corners, center: value }
+        Piece { bound, corners, center: value, edge: edge.unwrap_or_else(|| longest_edge(points)) }
     }
 
     /// Bounds the depth over a triangle by one face after the other: each is the nearest one to the
     /// place where the faces so far leave the greatest depth. Returns a lower bound of the signed
-    /// distance.
+    /// distance, and the barycentric coordinates of the last such place.
     fn bound_by_faces(
         &mut self,
         cuts: &mut Cuts,
         points: [DVec3; 3],
         distances: impl Fn(u32) -> [f64; 3],
-    ) -> f64 {
-        let mut bound = f64::NEG_INFINITY;
+    ) -> (f64, [f64; 3]) {
+        let (mut bound, mut place) = (f64::NEG_INFINITY, CORNERS[0]);
         for _ in 0..MAX_ADDED {
             let (depth, at) = summit(&cuts.values);
+            place = at;
             bound = bound.max(-depth);
             if !self.is_open(bound) {
                 break;
@@ -303,7 +311,7 @@ impl<'a> Branches<'a> {
             }
             cuts.add(found.position, distances(found.position), at);
         }
-        bound
+        (bound, place)
     }
 }
 
@@ -315,6 +323,10 @@ pub fn triangles(corners: &[Corner]) -> impl Iterator<Item = [Corner; 3]> {
 
 /// A triangle whose longest edge is shorter than this multiple of its depth is halved.
 const SHALLOW: f64 = 4.0;
+
+/// A distance that bends by less than this share of the tolerance along an edge is as good as
+/// linear.
+const BENT: f64 = 0.25;
 
 /// Number of faces that bound the depth over a triangle at a time. Three are equally near to its
 /// deepest point; more may be.
@@ -333,6 +345,33 @@ struct Cuts {
 impl Cuts {
     fn holds(&self, face: u32) -> bool {
         self.faces.contains(&face)
+    }
+
+    /// The edge of a triangle along which the distance to a face that bounds the depth at `at`
+    /// bends most: there the bound, which is linear between the corners, lies highest above it.
+    /// `None` where it bends nowhere by much.
+    ///
+    /// The deepest points of parallel prisms are a whole line. Halves of the longest edge would be
+    /// as short along this line as they have to be across it.
+    fn curved_edge(&self, asset: &TeSdf, points: [DVec3; 3], at: [f64; 3], tolerance: f64) -> Option<usize> {
+        let here = |values: &[f64; 3]| greatest_minimum::value(values, at);
+        let depth = self.values.iter().map(here).fold(f64::INFINITY, f64::min);
+        let mut most = (BENT * tolerance, None);
+        for (&face, values) in self.faces.iter().zip(&self.values) {
+            if here(values) > depth + tolerance {
+                continue;
+            }
+            let triangle = asset.local_triangle(face as usize);
+            for k in 0..3 {
+                let l = (k + 1) % 3;
+                let middle = triangle.closest(0.5 * (points[k] + points[l])).distance;
+                let bend = 0.5 * (values[k] + values[l]) - middle;
+                if bend > most.0 {
+                    most = (bend, Some(k));
+                }
+            }
+        }
+        most.1
     }
 
     /// Adds a face. If there are too many, it takes the place of the one that is farthest from the
