@@ -25,8 +25,8 @@ mod split;
 
 use crate::encode_all::Batch;
 use crate::encode_all::meshes::Mesh;
-pub use choices::{ChoiceArgs, RepairChoice};
 use choices::encode;
+pub use choices::{ChoiceArgs, RepairChoice};
 
 const ENCODED_HELP: &str = "Mesh file: STL, OBJ, PLY, OFF, glTF, GLB, 3MF, or STEP, IGES, BREP by the program Gmsh; or a \
                             robot description, URDF or MJCF, whose collision meshes are all encoded";

@@ -59,7 +59,8 @@ fn minima_are_followed_by_no_lower_point() {
         for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
             let bodies = relation.place(names, &mut random);
             let contact_distance = 1e-3 * bodies[0].diagonal();
-            let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, Mode::exact());
+            let counts =
+                DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, Mode::exact());
             all = [all[0] + counts[0], all[1] + counts[1]];
         }
     }

@@ -20,11 +20,11 @@ fn faces_of_vertices_are_uploaded_when_they_are_needed() {
     let scene = on_device::worlds(1, &mut Random(12));
     let mut detector = detector(&scene);
     let of = |mode| CollideOptions { contact_distance: 0.01, ..per_cell(mode) };
-    detector.detect(&scene, &of(Mode::Exact)).expect("detects");
+    detector.detect(&scene, &of(Mode::exact())).expect("detects");
     detector.detect_on_device(&scene, None, &of(Mode::Node)).expect("detects");
     let before = detector.bytes();
     assert_eq!(before.shapes.fans, 0);
-    detector.detect_on_device(&scene, None, &of(Mode::Exact)).expect("detects");
+    detector.detect_on_device(&scene, None, &of(Mode::exact())).expect("detects");
     let after = detector.bytes();
     assert!(after.shapes.fans > 0 && after.with_instances(3) == before.with_instances(3) + after.shapes.fans);
 }

@@ -12,7 +12,7 @@ use tesdf::collide::{CollideOptions, Contacts, Mode, Reduction};
 fn forms() -> Vec<CollideOptions> {
     let of = |mode| CollideOptions { contact_distance: 0.01, ..per_cell(mode) };
     let more = [
-        of(Mode::exact().per(ContactsPer::Face)),
+        CollideOptions { mode: Mode::exact(), ..of(Mode::exact()) },
         of(Mode::face().filtered(0.3)),
         CollideOptions { reduction: Reduction::PerPair(3), ..of(Mode::exact()) },
     ];

@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use crate::collide::bodies::surface::Part;
+use crate::collide::mode::Mode;
 use crate::collide::narrow::extremes::OPPOSES;
 use crate::collide::narrow::{Minimum, Search};
-use crate::collide::options::Mode;
 use crate::collide::scene::simple::Simple;
 
 /// Finds the minima of a part that are within the reach of `search`, as [`Search::minima`] does.
@@ -26,7 +26,9 @@ pub fn minima(
             }
             true
         }
-        (_, Simple::Plane) if search.is_of_faces() && mode == Mode::Exact && search.is_large(part) => {
+        (_, Simple::Plane)
+            if search.is_of_faces() && matches!(mode, Mode::Exact(_)) && search.is_large(part) =>
+        {
             over_plane(part, reach, found)
         }
         _ => false,
@@ -73,7 +75,8 @@ mod tests {
 
     use super::*;
     use crate::collide::detect::ordered_pair::OrderedPair;
-    use crate::collide::options::{CollideOptions, ContactsPer};
+    use crate::collide::mode::ContactsPer;
+    use crate::collide::options::CollideOptions;
     use crate::collide::scene::pose::Pose;
     use crate::collide::scene::shape::Shape;
     use crate::collide::scene::{Instance, Scene};
@@ -120,15 +123,14 @@ mod tests {
                 let shape = scene.add_shape(shape).expect("valid sizes");
                 scene.add(Instance::new(shape, pose)).expect("a valid pose")
             });
-            let (mode, contacts_per) = match case % 7 {
-                0 => (Mode::Node, ContactsPer::Face),
-                1 => (Mode::Exact, ContactsPer::Face),
-                2 => (Mode::Exact, ContactsPer::Cell),
-                3 => (Mode::Face, ContactsPer::Minimum),
-                _ => (Mode::Exact, ContactsPer::Minimum),
+            let mode = match case % 7 {
+                0 => Mode::Node,
+                1 => Mode::exact(),
+                2 => Mode::exact().per(ContactsPer::Cell),
+                3 => Mode::face().per(ContactsPer::Minimum),
+                _ => Mode::exact().per(ContactsPer::Minimum),
             };
-            let options =
-                CollideOptions { mode, contacts_per, contact_distance: 0.2, ..CollideOptions::default() };
+            let options = CollideOptions { mode, contact_distance: 0.2, ..CollideOptions::default() };
             let pair =
                 OrderedPair::new(&scene, &options, ids[0], ids[1], 0.2).expect("instances of the scene");
             let simple = Simple::from(&field);
