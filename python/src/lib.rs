@@ -12,6 +12,7 @@ mod detection;
 mod device;
 mod encode;
 mod errors;
+mod forces;
 mod given;
 mod interrupt;
 mod kept_pairs;

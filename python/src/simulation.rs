@@ -15,8 +15,7 @@ use tesdf::glam::DVec3;
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{
-    Drive, Dynamics, DynamicsError, Joint, Motor, PartialRun, Run, RunRecord, SimulateError, State, System,
-    Wrench,
+    Drive, Dynamics, DynamicsError, Motor, PartialRun, Run, RunRecord, SimulateError, State, System, Wrench,
 };
 
 use crate::contacts::{self, Columns};
@@ -25,7 +24,7 @@ use crate::device::{self, Device};
 use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::cancellable;
 use crate::poses::{Count, of_pose, of_velocity, poses, velocities};
-use crate::{classes, pool};
+use crate::{classes, forces, pool};
 
 /// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and
 /// run advance it.
@@ -329,15 +328,29 @@ impl Simulation {
         self.read(py, |r| r.engine.system().joints().iter().map(|joint| joint.name.clone()).collect())
     }
 
-    /// Current coordinates [J] of the joints: the angle of a hinge, rad within ±pi, the travel of a
-    /// slider, m, the angle by which a ball is bent, rad; 0 for a weld.
+    /// Current coordinates [J] of the joints: the angle of a hinge, rad, with the whole turns since
+    /// the start, the travel of a slider, m, the angle by which a ball is bent, rad; 0 for a weld.
     #[getter]
     fn coordinates<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let coordinate = |joint: &Joint, states: &[State]| joint.coordinate(System::poses_of(joint, states));
-        let coordinates: Vec<f64> = self.read(py, |r| {
-            r.engine.system().joints().iter().map(|joint| coordinate(joint, r.states())).collect()
-        });
-        PyArray1::from_vec(py, coordinates)
+        PyArray1::from_vec(py, self.read(py, |r| r.engine.system().coordinates().to_vec()))
+    }
+
+    /// Current rates [J] of the coordinates, rad/s or m/s; 0 for a ball and a weld.
+    #[getter]
+    fn coordinate_rates<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.read(py, |r| r.engine.system().coordinate_rates()))
+    }
+
+    /// The forces of the contacts that push, each the mean over the last step: ContactForces.
+    #[getter]
+    fn contact_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        forces::of_contacts(py, &self.read(py, |r| r.engine.forces().cloned()).unwrap_or_default().contacts)
+    }
+
+    /// What each joint did to its child, as the mean over the last step: JointForces.
+    #[getter]
+    fn joint_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        forces::of_joints(py, &self.read(py, |r| r.engine.forces().cloned()).unwrap_or_default().joints)
     }
 
     /// Sets the motor of a joint, given by its name or number, from the next step on. It drives one
@@ -346,7 +359,8 @@ impl Simulation {
     /// - velocity: a rate, rad/s or m/s.
     /// - position: the coordinate at the end of the step, rad or m.
     /// - force: a torque, N m, or force, N.
-    /// - spring: (rest, stiffness, damping), in rad, N m/rad, N m s/rad or m, N/m, N s/m.
+    /// - spring: (rest, stiffness, damping), in rad, N m/rad, N m s/rad or m, N/m, N s/m. With it,
+    ///   velocity is the rate that its damper aims at, and force acts in addition (feed-forward).
     ///
     /// limit is the greatest force, N, or torque, N m. Without a drive the joint has no motor. A
     /// script of the scene that drives the same joint replaces the motor in each step.
@@ -364,18 +378,22 @@ impl Simulation {
         spring: Option<[f64; 3]>,
         limit: f64,
     ) -> PyResult<()> {
-        let drives = [
-            velocity.map(Drive::Velocity),
-            position.map(Drive::Position),
-            force.map(Drive::Force),
-            spring.map(|[rest, stiffness, damping]| Drive::Spring { rest, stiffness, damping }),
-        ];
-        let drives: Vec<Drive> = drives.into_iter().flatten().collect();
-        if drives.len() > 1 {
-            let found = format!("{} of velocity, position, force and spring", drives.len());
-            return Err(argument("joint", found, "at most one of them"));
-        }
-        let motor = drives.first().map(|&drive| Motor { drive, limit });
+        let drive = match (velocity, position, force, spring) {
+            (None, None, None, None) => None,
+            (Some(velocity), None, None, None) => Some(Drive::Velocity(velocity)),
+            (None, Some(position), None, None) => Some(Drive::Position(position)),
+            (None, None, Some(force), None) => Some(Drive::Force(force)),
+            (velocity, None, force, Some([rest, stiffness, damping])) => {
+                let [velocity, force] = [velocity, force].map(Option::unwrap_or_default);
+                Some(Drive::Spring { rest, stiffness, damping, velocity, force })
+            }
+            _ => {
+                let expected =
+                    "one of velocity, position, force and spring, or spring with velocity and force";
+                return Err(argument("joint", "several drives", expected));
+            }
+        };
+        let motor = drive.map(|drive| Motor { drive, limit });
         let joint = index_of("joint", joint, &self.joints(py))?;
         self.change(py, |engine| engine.set_motor(joint, motor))
     }

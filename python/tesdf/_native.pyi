@@ -9,12 +9,14 @@ from .bodies import Shape
 from .contacts import (
     Clearances,
     CoarseContacts,
+    ContactForces,
     ContactPatches,
     ContactRows,
     Contacts,
     DeviceContacts,
     Impacts,
     Instances,
+    JointForces,
     Record,
     StepContacts,
     TouchingFeatures,
@@ -407,6 +409,12 @@ class Simulation:
     def joints(self) -> list[str]: ...
     @property
     def coordinates(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def coordinate_rates(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def contact_forces(self) -> ContactForces: ...
+    @property
+    def joint_forces(self) -> JointForces: ...
     @property
     def poses(self) -> npt.NDArray[np.float64]: ...
     @property

@@ -305,6 +305,45 @@ class StepContacts(ContactRows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class ContactForces(_Rows):
+    """The forces between bodies at the contacts of a step, each the mean over the step."""
+
+    bodies: _Id
+    """[N, 2] the force acts on the first body, and its opposite on the second"""
+    points: _Float
+    """[N, 3] m"""
+    normals: _Float
+    """[N, 3] out of the second body"""
+    normal_forces: _Float
+    """[N] force along the normal, N"""
+    frictions: _Float
+    """[N, 3] force across the normal on the first body, N"""
+
+    @property
+    def forces(self) -> _Float:
+        """[N, 3] the whole force on the first body, N"""
+        return self.normal_forces[:, None] * self.normals + self.frictions
+
+    def on(self, body: int) -> _Float:
+        """The sum [3] of the forces on a body, N."""
+        sign = (self.bodies == body) @ np.array([1.0, -1.0])
+        return np.asarray(sign @ self.forces)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class JointForces(_Rows):
+    """What each of J joints did to its child in a step, as the mean over the step. To its parent, it
+    did the opposite."""
+
+    forces: _Float
+    """[J, 3] N, with that of the motor of a slider"""
+    torques: _Float
+    """[J, 3] about the joint's anchor, N m, with that of the motor of a hinge"""
+    motors: _Float
+    """[J] torque of the motor of a hinge, N m, or force of that of a slider, N"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Record(_Rows):
     """The states of B bodies after 0 to S steps of a simulation, and R recorded contacts."""
 

@@ -163,6 +163,45 @@ def test_a_scene_of_a_dict_is_that_of_the_file(tmp_path):
     assert np.array_equal(one.record().poses, other.record().poses)
 
 
+def test_forces_are_the_weight_and_what_motors_do():
+    scene = {
+        "time_step": 5e-3,
+        "duration": 1,
+        "bodies": [
+            {"name": "floor", "shape": "plane", "fixed": True},
+            {"name": "ball", "shape": {"sphere": {"radius": 0.02}}, "mass": 0.1, "translation": [0, 0, 0.02]},
+            {
+                "name": "rod",
+                "shape": {"box": {"half_extents": [0.1, 0.01, 0.01]}},
+                "mass": 2,
+                "translation": [0.1, 0, 1],
+            },
+        ],
+        "joints": [
+            {
+                "name": "axle",
+                "kind": "hinge",
+                "child": "rod",
+                "anchor": [0, 0, 1],
+                "axis": [0, 1, 0],
+                "motor": {"limit": 100, "drive": {"velocity": -20}},
+            }
+        ],
+    }
+    simulation = tesdf.Simulation(scene)
+    simulation.run()
+    contacts, joints = simulation.contact_forces, simulation.joint_forces
+    assert len(contacts) == 1 and set(contacts.bodies[0]) == {0, 1}
+    assert contacts.on(1) == pytest.approx([0, 0, 0.1 * 9.81], rel=1e-6, abs=1e-9)
+    assert contacts.on(0) == pytest.approx([0, 0, -0.1 * 9.81], rel=1e-6, abs=1e-9)
+    assert contacts.forces.shape == (1, 3) and contacts.points[0] == pytest.approx([0, 0, 0], abs=1e-6)
+    assert simulation.coordinates[0] == pytest.approx(-20, rel=1e-2)
+    assert simulation.coordinate_rates[0] == pytest.approx(-20, rel=1e-2)
+    angle = -simulation.coordinates[0] - 20 * 2.5e-3
+    assert joints.motors[0] == pytest.approx(-2 * 9.81 * 0.1 * np.cos(angle), abs=0.1)
+    assert np.linalg.norm(joints.forces[0]) == pytest.approx(2 * 0.1 * 20**2, abs=25)
+
+
 def test_motors_wrenches_and_states_are_set_between_steps():
     simulation = tesdf.Simulation(SLIDER)
     assert simulation.joints == ["slide"] and simulation.coordinates.tolist() == [0]
@@ -201,7 +240,7 @@ def test_errors_of_what_is_set():
         simulation.set_motor("slid", velocity=1.0)
     with pytest.raises(ValueError, match="body: 3; expected a number from 0 to 2, or one of rail, car, ball"):
         simulation.set_wrench(3)
-    with pytest.raises(ValueError, match="joint: 2 of velocity, position, force and spring; expected at most one"):
+    with pytest.raises(ValueError, match="joint: several drives; expected one of velocity, position, force and spring"):
         simulation.set_motor("slide", velocity=1.0, force=1.0)
     with pytest.raises(tesdf.SimulationError, match="joint slide: "):
         simulation.set_motor("slide", velocity=1.0, limit=-1.0)

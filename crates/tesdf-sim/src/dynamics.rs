@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use tesdf::collide::{Contact, HiddenOverlap};
 
-use crate::{DynamicsError, Motor, State, System, Wrench};
+use crate::{DynamicsError, Forces, Motor, State, System, Wrench};
 
 /// A physics engine that moves the bodies of a [`System`].
 pub trait Dynamics {
@@ -60,6 +60,11 @@ pub trait Dynamics {
     /// The pairs of bodies that overlapped at the beginning of the last step without a contact that
     /// shows it.
     fn hidden(&self) -> &[HiddenOverlap];
+
+    /// The forces of contacts and joints in the last step; `None` from an engine that does not tell.
+    fn forces(&self) -> Option<&Forces> {
+        None
+    }
 }
 
 /// Statistics of one step.

@@ -40,6 +40,21 @@ pub struct Joint {
     pub limits: Option<[f64; 2]>,
     /// Drives the coordinate of a hinge or a slider.
     pub motor: Option<Motor>,
+    /// Resists the motion of a hinge or a slider.
+    pub resistance: JointResistance,
+}
+
+/// What resists the motion of a hinge or a slider besides its motor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct JointResistance {
+    /// Torque or force per rate of the coordinate, N m s/rad or N s/m.
+    pub damping: f64,
+    /// Dry friction: the greatest torque or force with which the joint resists motion, N m or N.
+    pub friction: f64,
+    /// Inertia of what turns or slides along with the coordinate, such as a rotor seen through its
+    /// gear, kg m² or kg.
+    pub armature: f64,
 }
 
 /// A motor of a hinge or a slider.
@@ -68,6 +83,12 @@ pub enum Drive {
         stiffness: f64,
         /// N m s/rad or N s/m.
         damping: f64,
+        /// The rate that the damper aims at, rad/s or m/s.
+        #[serde(default)]
+        velocity: f64,
+        /// Acts in addition to both (feed-forward), N m or N.
+        #[serde(default)]
+        force: f64,
     },
     /// A force, N, or torque, N m. Its magnitude is bounded by the motor's limit.
     Force(f64),
@@ -85,7 +106,16 @@ impl Joint {
     ) -> Self {
         let parent_pose = if parent.is_some() { poses[0] } else { Pose::IDENTITY };
         let frames = [parent_pose, poses[1]].map(|body| relative(body, frame));
-        Self { name: name.into(), kind, parent, child, frames, limits: None, motor: None }
+        Self {
+            name: name.into(),
+            kind,
+            parent,
+            child,
+            frames,
+            limits: None,
+            motor: None,
+            resistance: JointResistance::default(),
+        }
     }
 
     /// The joint's frames in the world, when the parent and the child are at `poses`.
@@ -161,8 +191,8 @@ impl Joint {
             }
             let (values, positive) = match drive {
                 Drive::Velocity(x) | Drive::Position(x) | Drive::Force(x) => ([x; 3], true),
-                Drive::Spring { rest, stiffness, damping } => (
-                    [rest, stiffness, damping],
+                Drive::Spring { rest, stiffness, damping, velocity, force } => (
+                    [rest + velocity + force, stiffness, damping],
                     stiffness >= 0.0 && damping >= 0.0 && stiffness + damping > 0.0,
                 ),
             };
@@ -170,6 +200,15 @@ impl Joint {
                 return Err(format!(
                     "its motor has {drive:?}; expected finite numbers, of a spring also 0 or greater, not both 0"
                 ));
+            }
+        }
+        let JointResistance { damping, friction, armature } = self.resistance;
+        for (name, value) in [("damping", damping), ("friction", friction), ("armature", armature)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(format!("{name} {value}; expected a finite number, 0 or greater"));
+            }
+            if value > 0.0 && !has_coordinate {
+                return Err(format!("only hinges and sliders have {name}; take it out"));
             }
         }
         Ok(())

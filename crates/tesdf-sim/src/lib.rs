@@ -27,6 +27,7 @@
 pub mod criterion;
 mod dynamics;
 mod error;
+mod forces;
 mod joint;
 mod mass;
 pub mod newton;
@@ -41,7 +42,8 @@ mod warning;
 
 pub use dynamics::{Dynamics, Residual, StepReport};
 pub use error::DynamicsError;
-pub use joint::{Drive, Joint, JointKind, Motor};
+pub use forces::{ContactForce, Forces, JointForce};
+pub use joint::{Drive, Joint, JointKind, JointResistance, Motor};
 pub use mass::{MassError, MassProperties};
 pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};
 pub use simulate::{Moment, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};

@@ -5,6 +5,7 @@ mod integral;
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
+use nalgebra::{Matrix3, SymmetricEigen};
 use tesdf::TeSdf;
 use tesdf::base::InsideRule;
 use tesdf::collide::Shape;
@@ -44,7 +45,25 @@ pub enum MassError {
         /// The signed volume, m³.
         volume: f64,
     },
+    /// No body has these moments of inertia.
+    #[error(
+        "moments of inertia {moments:?} kg m² about the principal axes; expected finite numbers greater than 0, none \
+         greater than the sum of the others"
+    )]
+    Inertia {
+        /// About the principal axes, kg m².
+        moments: [f64; 3],
+    },
+    /// The centre of mass is not finite.
+    #[error("centre of mass {found}; expected finite numbers")]
+    Center {
+        /// The value that was given.
+        found: DVec3,
+    },
 }
+
+/// Moments of inertia may break the triangle inequality by this share of the greatest one: rounding.
+const TRIANGLE: f64 = 1e-9;
 
 impl MassProperties {
     /// Mass properties of a shape of uniform `density`, kg/m³. `scale` is the length of one unit of
@@ -136,6 +155,29 @@ impl MassProperties {
             Integral::of_part(volume, center, volume / 12.0 * (around + along))
         };
         triangles.map(part).sum::<Integral>().about(middle)
+    }
+
+    /// Mass properties from elsewhere: the mass, kg, the centre of mass in the body's frame, m, and
+    /// the inertia about it along the axes of that frame, kg m².
+    ///
+    /// # Errors
+    /// A number that no body has.
+    pub fn new(mass: f64, center: DVec3, inertia: DMat3) -> Result<Self, MassError> {
+        check("mass", mass)?;
+        if !center.is_finite() {
+            return Err(MassError::Center { found: center });
+        }
+        let found = inertia.to_cols_array();
+        let moments = match found.iter().all(|x| x.is_finite()) {
+            true => SymmetricEigen::new(Matrix3::from_column_slice(&found)).eigenvalues.into(),
+            false => [f64::NAN; 3],
+        };
+        let [x, y, z] = moments;
+        let most = x.max(y).max(z);
+        if !(x.min(y).min(z) > 0.0 && 2.0 * most <= (x + y + z) * (1.0 + TRIANGLE)) {
+            return Err(MassError::Inertia { moments });
+        }
+        Ok(Self { mass, center, inertia })
     }
 
     /// The same distribution of mass, scaled to the total `mass`, kg.

@@ -339,7 +339,9 @@ fn with_target(motor: Motor, target: f64) -> Motor {
         Drive::Velocity(_) => Drive::Velocity(target),
         Drive::Position(_) => Drive::Position(target),
         Drive::Force(_) => Drive::Force(target),
-        Drive::Spring { stiffness, damping, .. } => Drive::Spring { rest: target, stiffness, damping },
+        Drive::Spring { stiffness, damping, velocity, force, .. } => {
+            Drive::Spring { rest: target, stiffness, damping, velocity, force }
+        }
     };
     Motor { drive, ..motor }
 }

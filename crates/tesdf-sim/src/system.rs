@@ -3,7 +3,8 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 use tesdf::collide::{CollideError, Instance, InstanceId, Pose, Scene, Shape, ShapeId, Velocity};
 
-use crate::{DynamicsError, Joint, MassProperties, Motor};
+use crate::joint::wrapped;
+use crate::{DynamicsError, Joint, JointKind, MassProperties, Motor};
 
 /// Whether a body moves, and its mass properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +28,8 @@ pub struct Body {
     pub mass: Mass,
     /// Coefficient of friction, see [`System::friction`].
     pub friction: f64,
+    /// Coefficient of restitution, see [`System::restitution`].
+    pub restitution: f64,
     /// Rate at which the angular velocity of a free body decays, 1/s: in a step of h seconds, it is
     /// divided by 1 + h times this.
     pub angular_damping: f64,
@@ -85,6 +88,8 @@ pub struct System {
     states: Vec<State>,
     wrenches: Vec<Wrench>,
     joints: Vec<Joint>,
+    /// The coordinate of each joint, with its whole turns.
+    coordinates: Vec<f64>,
     /// Coefficients of friction of pairs of bodies, the lower number first.
     pair_friction: BTreeMap<(usize, usize), f64>,
     /// Acceleration of every free body, m/s².
@@ -106,7 +111,8 @@ impl System {
     }
 
     /// Adds a body and returns its number: 0, 1, 2, … in the order of the calls. A free or
-    /// kinematic body starts with the velocity of `instance`. Its friction and damping are 0.
+    /// kinematic body starts with the velocity of `instance`. Its friction, restitution and
+    /// damping are 0.
     ///
     /// # Errors
     /// The same errors as [`Scene::add`].
@@ -128,7 +134,14 @@ impl System {
                     (velocity.linear + velocity.angular.cross(arm), velocity.angular);
             }
         }
-        self.bodies.push(Body { name: name.into(), instance: id, mass, friction: 0.0, angular_damping: 0.0 });
+        self.bodies.push(Body {
+            name: name.into(),
+            instance: id,
+            mass,
+            friction: 0.0,
+            restitution: 0.0,
+            angular_damping: 0.0,
+        });
         self.states.push(state);
         self.wrenches.push(Wrench::default());
         Ok(self.bodies.len() - 1)
@@ -160,6 +173,7 @@ impl System {
         if let Some(parent) = joint.parent {
             self.exclude(parent, joint.child)?;
         }
+        self.coordinates.push(joint.coordinate(Self::poses_of(&joint, &self.states)));
         self.joints.push(joint);
         Ok(self.joints.len() - 1)
     }
@@ -167,6 +181,69 @@ impl System {
     /// The joints.
     pub fn joints(&self) -> &[Joint] {
         &self.joints
+    }
+
+    /// The [coordinate](Joint::coordinate) of each joint now, where the angle of a hinge goes on past
+    /// ±π: it counts the turns that steps have made since the joint was added. A state that is set
+    /// from outside counts as the shortest turn.
+    pub fn coordinates(&self) -> &[f64] {
+        &self.coordinates
+    }
+
+    /// The rates of the [coordinates](Joint::coordinate) now, rad/s or m/s; 0 for welds and balls.
+    pub fn coordinate_rates(&self) -> Vec<f64> {
+        self.joints.iter().map(|joint| self.rate_of(joint, &self.states)).collect()
+    }
+
+    /// The rate of the coordinate of a joint at `states`.
+    pub(crate) fn rate_of(&self, joint: &Joint, states: &[State]) -> f64 {
+        let [parent, child] = joint.frames_in_world(Self::poses_of(joint, states));
+        let axis = parent.rotation * DVec3::Z;
+        // Of a body's point that is at the origin of the child's frame now.
+        let velocity = |body: usize| {
+            let state = &states[body];
+            let center = match self.bodies[body].mass {
+                Mass::Free(mass) => mass.center,
+                Mass::Fixed | Mass::Kinematic => DVec3::ZERO,
+            };
+            let arm = child.translation - state.pose.to_world(center);
+            (state.linear + state.angular.cross(arm), state.angular)
+        };
+        let (linear, angular) = velocity(joint.child);
+        let (of_parent, turning) = joint.parent.map_or((DVec3::ZERO, DVec3::ZERO), velocity);
+        match joint.kind {
+            JointKind::Hinge => axis.dot(angular - turning),
+            JointKind::Slider => axis.dot(linear - of_parent),
+            JointKind::Weld | JointKind::Ball => 0.0,
+        }
+    }
+
+    /// Replaces all states by those after a motion of `time` seconds: hinges have turned as their
+    /// rates tell.
+    ///
+    /// # Errors
+    /// As [`set_states`](Self::set_states).
+    pub(crate) fn follow(&mut self, states: Vec<State>, time: f64) -> Result<(), DynamicsError> {
+        let turned = self.joints.iter().zip(&self.coordinates).map(|(joint, &before)| {
+            let rates = self.rate_of(joint, &self.states) + self.rate_of(joint, &states);
+            before + 0.5 * time * rates
+        });
+        let turned: Vec<f64> = turned.collect();
+        self.set_states(states)?;
+        self.count_turns(&turned);
+        Ok(())
+    }
+
+    /// The coordinates at the current states, of hinges those nearest to `expected`.
+    fn count_turns(&mut self, expected: &[f64]) {
+        let coordinates = self.joints.iter().zip(expected).map(|(joint, expected)| {
+            let coordinate = joint.coordinate(Self::poses_of(joint, &self.states));
+            match joint.kind {
+                JointKind::Hinge => expected + wrapped(coordinate - expected),
+                JointKind::Slider | JointKind::Weld | JointKind::Ball => coordinate,
+            }
+        });
+        self.coordinates = coordinates.collect();
     }
 
     /// Replaces the motor of a joint.
@@ -198,6 +275,31 @@ impl System {
         self.body(body)?;
         self.bodies[body].friction = not_negative("friction", coefficient)?;
         Ok(())
+    }
+
+    /// Sets the coefficient of restitution of a body.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::Option`] when it is not a number from 0 to 1.
+    pub fn set_restitution(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
+        self.body(body)?;
+        if !(0.0..=1.0).contains(&coefficient) {
+            let expected = "a number from 0 to 1";
+            return Err(DynamicsError::Option { option: "restitution", found: coefficient, expected });
+        }
+        self.bodies[body].restitution = coefficient;
+        Ok(())
+    }
+
+    /// The coefficient of restitution between two bodies: the geometric mean of theirs. It is the
+    /// speed at which they part over the speed at which they meet.
+    pub fn restitution(&self, a: usize, b: usize) -> f64 {
+        (self.bodies[a].restitution * self.bodies[b].restitution).sqrt()
+    }
+
+    /// Whether a body has a restitution.
+    pub(crate) fn has_restitution(&self) -> bool {
+        self.bodies.iter().any(|body| body.restitution > 0.0)
     }
 
     /// Sets the [angular damping](Body::angular_damping) of a body, 1/s.
@@ -305,6 +407,7 @@ impl System {
         self.check(body, &state)?;
         let pose = Pose::new(state.pose.translation, state.pose.rotation)?;
         self.states[body] = State { pose, ..state };
+        self.count_turns(&self.coordinates.clone());
         Ok(())
     }
 
@@ -320,6 +423,7 @@ impl System {
         }
         states.iter().enumerate().try_for_each(|(body, state)| self.check(body, state))?;
         self.states = states;
+        self.count_turns(&self.coordinates.clone());
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use tesdf::collide::{
     CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Shape, instance_pairs,
 };
 
+use super::bounce::{Bounces, Meeting};
 use super::deep::Surfaces;
 use super::gaps::Gaps;
 use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
@@ -16,8 +17,10 @@ use super::rotation::Rotation;
 use super::rows::FreeBody;
 use super::sleep::Sleep;
 use super::step::{Step, set_velocities};
+use super::velocities::Solved;
 use super::{Detect, Newton, NewtonOptions};
 use crate::dynamics::Verdict;
+use crate::forces::Forces;
 use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
 /// Maximum number of further detections in a step when bodies close faster than was foreseen.
@@ -42,8 +45,19 @@ struct Part {
     passing: Option<Passing>,
     /// Whether joints do not hold in it, but may in shorter parts.
     is_loose: bool,
+    /// The forces in it.
+    forces: Forces,
     /// What is reported of it.
     report: StepReport,
+}
+
+/// What came of an attempt to solve a part of a step.
+enum Made {
+    Part(Part),
+    /// Bodies have woken, or have bounced off each other: it is to be solved anew.
+    Again,
+    /// The part must end after this time, s, where bodies bounce off each other.
+    In(f64),
 }
 
 impl Newton {
@@ -67,8 +81,9 @@ impl Newton {
         let sizes = diagonals.collect::<Result<_, CollideError>>()?;
         let (detector, found) = (Box::new(detector), Contacts::default());
         let surfaces = Surfaces::new(system.scene(), collide.mode);
+        let forces = Forces::none(system.joints().len());
         let (sleep, kept) = (Sleep::new(system.states()), Kept::default());
-        Ok(Self { system, detector, collide, options, sizes, surfaces, found, sleep, kept })
+        Ok(Self { system, detector, collide, options, sizes, surfaces, found, forces, sleep, kept })
     }
 
     /// Sets gravity, m/s², from now on. All bodies wake.
@@ -265,9 +280,8 @@ impl Newton {
         Ok((left / parts).max(whole / MOST_PARTS).min(left))
     }
 
-    /// Solves a part of a step, `whole`, that takes `time_step` seconds. Nothing moves yet. Returns
-    /// `None` where bodies have woken, which is to be solved anew.
-    fn part(&mut self, time_step: f64, whole: f64) -> Result<Option<Part>, DynamicsError> {
+    /// Solves a part of a step, `whole`, that takes `time_step` seconds. Nothing moves yet.
+    fn part(&mut self, time_step: f64, whole: f64, bounces: &mut Bounces) -> Result<Made, DynamicsError> {
         let begin = Instant::now();
         let mut step = self.begin(time_step, whole);
         // The detection must reach as far as the step can close, so it uses the velocities that
@@ -279,11 +293,16 @@ impl Newton {
         set_velocities(&mut ahead, &step.free, &target);
         let mut look = self.look(&mut step, &ahead)?;
         if self.wakes(look.contacts.as_slice()) {
-            return Ok(None);
+            return Ok(Made::Again);
         }
-        let [mut velocities, mut carried] = self.velocities(&mut step, look.contacts.as_slice())?;
+        match self.meet(&mut step, look.contacts.as_slice(), bounces)? {
+            Meeting::None => {}
+            Meeting::Parted => return Ok(Made::Again),
+            Meeting::After(time) => return Ok(Made::In(time)),
+        }
+        let mut solved = self.velocities(&mut step, look.contacts.as_slice())?;
         for _ in 0..MORE_LOOKS {
-            if !self.look_on(&step, &look, &mut ahead, &velocities)? {
+            if !self.look_on(&step, &look, &mut ahead, &solved.velocities)? {
                 break;
             }
             let more = self.look(&mut step, &ahead)?;
@@ -291,12 +310,13 @@ impl Newton {
                 break;
             }
             if self.wakes(look.contacts.as_slice()) {
-                return Ok(None);
+                return Ok(Made::Again);
             }
             // What an earlier minimisation did not reach is of no account.
             step.report.take_back(Verdict::GOOD);
-            [velocities, carried] = self.velocities(&mut step, look.contacts.as_slice())?;
+            solved = self.velocities(&mut step, look.contacts.as_slice())?;
         }
+        let Solved { velocities, carried, forces } = solved;
         let mut states = self.moved(&step, &velocities);
         let passing = self.passing(&mut step, &states)?;
         let is_loose = self.is_loose(&states, time_step, whole);
@@ -304,7 +324,7 @@ impl Newton {
         let mut report = step.report;
         let found = look.contacts;
         report.solution = begin.elapsed().saturating_sub(report.detection);
-        Ok(Some(Part { states, found, passing, is_loose, report }))
+        Ok(Made::Part(Part { states, found, passing, is_loose, forces, report }))
     }
 
     /// Moves by a step, in as many parts as bodies that turn far, fast pairs and joints need.
@@ -312,17 +332,22 @@ impl Newton {
         let mut report = self.begin_sleep(whole)?;
         let mut first: Option<Contacts> = None;
         let mut touching = Vec::new();
+        let mut bounces = Bounces::new(self.system.joints().len());
         let (mut left, mut longest) = (whole, whole);
         let mut time = self.part_of(left, whole)?;
         if self.is_all_still() {
             (left, report.parts) = (0.0, 1);
         }
         while left > 0.0 {
-            let Some(Part { states, found, passing, is_loose, report: mut of_part }) =
-                self.part(time, whole)?
-            else {
-                continue;
+            let part = match self.part(time, whole, &mut bounces)? {
+                Made::Part(part) => part,
+                Made::Again => continue,
+                Made::In(sooner) => {
+                    time = sooner;
+                    continue;
+                }
             };
+            let Part { states, found, passing, is_loose, forces: of_rows, report: mut of_part } = part;
             let may_divide = report.divided < MOST_DIVISIONS;
             let half = is_loose.then_some(Passing { hit: None, pairs: 0 });
             let divides = passing.filter(|_| may_divide).or(half);
@@ -344,12 +369,16 @@ impl Newton {
             report.parts += 1;
             report.unbounded += passing.map_or(0, |passing| passing.pairs);
             report.converged &= passing.is_none();
-            self.system.set_states(states)?;
+            self.system.follow(states, time)?;
+            bounces.forces.add(&of_rows, time / whole);
             left -= time;
             longest *= 2.0;
             time = self.part_of(left, whole)?.min(longest);
         }
         self.found = first.unwrap_or_else(|| self.with_kept(Contacts::default()));
+        let Bounces { forces, report: of_bounces, .. } = bounces;
+        report.add(&of_bounces);
+        self.forces = self.with_still(forces);
         report.contacts = self.found.len();
         report.deepest = self.found.iter().map(|c| c.distance).reduce(f64::min);
         report.asleep = self.end_sleep(whole, &touching)?;
@@ -407,6 +436,10 @@ impl Dynamics for Newton {
 
     fn contacts(&self) -> &[Contact] {
         self.found.as_slice()
+    }
+
+    fn forces(&self) -> Option<&Forces> {
+        Some(&self.forces)
     }
 
     fn hidden(&self) -> &[HiddenOverlap] {

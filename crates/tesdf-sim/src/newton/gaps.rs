@@ -58,6 +58,13 @@ pub struct Found<'a> {
     way: f64,
 }
 
+impl Found<'_> {
+    /// The way by which kinematic bodies open the gap in the step, m.
+    pub fn carried(&self) -> f64 {
+        self.carried
+    }
+}
+
 /// What the contacts of two instances have in common.
 struct Pair {
     centers: [Option<Center>; 2],

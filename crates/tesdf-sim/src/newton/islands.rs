@@ -82,6 +82,7 @@ mod tests {
             id: RowId::Joint(0),
             arms: [DVec3::ZERO; 2],
             sides: [side(a), side(b)],
+            point: DVec3::ZERO,
             gap: 0.0,
             relaxed_gap: 0.0,
             stiffness: Stiffness::Relative(1.0),

@@ -9,6 +9,7 @@ use tesdf::collide::Pose;
 
 use super::integrate::pack;
 use super::rows::{Bodies, PUSHES, Resistance, Row, RowId, Stiffness};
+use crate::joint::JointResistance;
 use crate::joint::{axes, rotation_between, swing, wrapped};
 use crate::{Drive, Joint, JointKind, Mass, System};
 
@@ -47,10 +48,35 @@ pub fn joint_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
         let poses = System::poses_of(joint, bodies.system.states());
         let point = joint.frames_in_world(poses)[1].translation;
         let row = |measure: Measure| row(joint, measure, point, bodies, h);
-        measures(joint, poses, h).into_iter().map(row).collect::<Vec<_>>()
+        measures(joint, poses, bodies.system.rate_of(joint, bodies.system.states()), h)
+            .into_iter()
+            .map(row)
+            .collect::<Vec<_>>()
     };
     let rows = bodies.system.joints().iter().flat_map(of_joint);
     rows.enumerate().map(|(k, row)| Row { id: RowId::Joint(k), ..row }).collect()
+}
+
+/// The same for an impact, which takes no time: what must hold stops to move, and all else, such as
+/// limits, motors and springs, does nothing.
+pub fn impact_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
+    let mut rows = joint_rows(bodies, h);
+    let mut k = 0;
+    for joint in bodies.system.joints() {
+        let poses = System::poses_of(joint, bodies.system.states());
+        for measure in measures(joint, poses, 0.0, h) {
+            let row = &mut rows[k];
+            match measure {
+                Measure { error: Error::Position(error), bounds: [low, high], .. } if low == -high => {
+                    row.gap -= error
+                }
+                _ => row.bounds = [0.0; 2],
+            }
+            row.relaxed_gap = row.gap;
+            k += 1;
+        }
+    }
+    rows
 }
 
 /// Sets the gaps of `rows`, which are those of all joints, to the errors at the poses that
@@ -58,7 +84,8 @@ pub fn joint_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
 pub fn predict(rows: &mut [Row], bodies: &Bodies<'_>, poses: &[Pose], velocities: &[Vector6<f64>], h: f64) {
     let of_joint = |joint: &Joint| {
         let parent = joint.parent.map_or(Pose::IDENTITY, |parent| poses[parent]);
-        measures(joint, [parent, poses[joint.child]], h)
+        // The rate matters for no position.
+        measures(joint, [parent, poses[joint.child]], 0.0, h)
     };
     for (row, measure) in rows.iter_mut().zip(bodies.system.joints().iter().flat_map(of_joint)) {
         if let Error::Position(error) = measure.error {
@@ -68,8 +95,26 @@ pub fn predict(rows: &mut [Row], bodies: &Bodies<'_>, poses: &[Pose], velocities
     }
 }
 
-/// The measures of a joint. Their number depends on the joint alone.
-fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
+/// The number of rows of a joint; that of its motor is the last one.
+pub fn row_count(joint: &Joint) -> usize {
+    let held = match joint.kind {
+        JointKind::Weld => 6,
+        JointKind::Ball => 3,
+        JointKind::Hinge | JointKind::Slider => 5,
+    };
+    let limits = match (joint.limits, joint.kind) {
+        (None, _) => 0,
+        (Some(_), JointKind::Ball) => 1,
+        (Some(_), _) => 2,
+    };
+    let JointResistance { damping, friction, armature } = joint.resistance;
+    let resisting = [damping, friction, armature].into_iter().filter(|part| *part > 0.0).count();
+    held + limits + resisting + usize::from(joint.motor.is_some())
+}
+
+/// The measures of a joint. Their number depends on the joint alone. `before` is the rate of its
+/// coordinate at the beginning of the step.
+fn measures(joint: &Joint, poses: [Pose; 2], before: f64, h: f64) -> Vec<Measure> {
     let [a, b] = joint.frames_in_world(poses);
     let [x, y, z] = axes(a);
     let (way, turn) = (b.translation - a.translation, rotation_between(a, b));
@@ -105,6 +150,21 @@ fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
         }
         found.push(push(coordinate - high, [f64::NEG_INFINITY, 0.0]));
     }
+    let JointResistance { damping, friction, armature } = joint.resistance;
+    let resists = |error, bounds, stiffness, resistance| {
+        let error = Error::Rate(error);
+        Measure { direction: axis, error, bounds, stiffness, resistance }
+    };
+    if damping > 0.0 {
+        found.push(resists(0.0, free, Some(damping / h), Resistance::Spring));
+    }
+    if friction > 0.0 {
+        found.push(resists(0.0, [-friction, friction], None, Resistance::Rigid));
+    }
+    if armature > 0.0 {
+        // Its force a (q̇₀ − q̇) / h is that of a damper which aims at the rate at the beginning.
+        found.push(resists(before, free, Some(armature / (h * h)), Resistance::Spring));
+    }
     if let Some(motor) = joint.motor {
         let limit = [-motor.limit, motor.limit];
         let from = |target: f64| match joint.kind {
@@ -118,9 +178,10 @@ fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
                 let force = force.clamp(-motor.limit, motor.limit);
                 (Error::Rate(0.0), [force; 2], None, Resistance::Rigid)
             }
-            // k (x + h ẋ) + d ẋ = (k h + d) (ẋ + k x / (k h + d)), at the end of the step.
-            Drive::Spring { rest, stiffness: k, damping: d } => {
-                let rate = -k * from(rest) / (k * h + d);
+            // k (x + h ẋ) + d (ẋ − u) − f = (k h + d) (ẋ + (k x − d u − f) / (k h + d)), at the end of the
+            // step.
+            Drive::Spring { rest, stiffness: k, damping: d, velocity, force } => {
+                let rate = (d * velocity + force - k * from(rest)) / (k * h + d);
                 (Error::Rate(rate), limit, Some(k + d / h), Resistance::Spring)
             }
         };
@@ -161,6 +222,7 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
     Row {
         id: RowId::Joint(0),
         sides,
+        point,
         arms,
         gap,
         relaxed_gap: gap,

@@ -27,7 +27,9 @@
 use tesdf::collide::{CollideError, CollideOptions, Contacts, Mode, Scene};
 
 use crate::System;
+use crate::forces::Forces;
 
+mod bounce;
 mod chains;
 mod deep;
 mod engine;
@@ -49,6 +51,7 @@ mod options;
 mod passing;
 mod pattern;
 mod problem;
+mod reactions;
 mod relative;
 mod resting;
 mod rotation;
@@ -104,6 +107,8 @@ pub struct Newton {
     surfaces: Surfaces,
     /// What the last step found at its beginning.
     found: Contacts,
+    /// Of the last step.
+    forces: Forces,
     sleep: Sleep,
     kept: Kept,
 }

@@ -190,6 +190,7 @@ mod tests {
             Row {
                 id: RowId::Joint(k),
                 sides: [side(a, arms[0], normal), side(b, arms[1], -normal).filter(|_| !k.is_multiple_of(3))],
+                point: DVec3::ZERO,
                 arms,
                 gap,
                 relaxed_gap: gap,

@@ -66,6 +66,8 @@ pub struct Row {
     /// Up to two free bodies: the index of each in the list of free bodies, and the derivative of
     /// the gap by its velocity.
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
+    /// Where the force acts in the world, with the bodies where the row was found, m.
+    pub point: DVec3,
     /// The vectors from the centres of mass of the two sides to the point where the force acts, m.
     /// Of no account for a torque.
     pub arms: [DVec3; 2],
@@ -141,6 +143,7 @@ impl Row {
 
     /// Takes the mean of the directions of this row and of `other`, which has the same bodies.
     pub fn average(&mut self, other: &Self) {
+        self.point = 0.5 * (self.point + other.point);
         self.arms = [0, 1].map(|k| 0.5 * (self.arms[k] + other.arms[k]));
         for (side, other) in self.sides.iter_mut().zip(&other.sides) {
             if let (Some((_, j)), Some((_, k))) = (side, other) {
@@ -174,6 +177,7 @@ impl Row {
             id: RowId::Contact([contact.instance_a, contact.instance_b], contact.feature.a),
             sides: sides.map(|side| side.map(|(_, side)| side)),
             arms: sides.map(|side| side.map_or(DVec3::ZERO, |(arm, _)| arm)),
+            point: contact.point_a,
             gap: contact.distance,
             relaxed_gap: contact.distance,
             stiffness: Stiffness::Relative(stiffness),

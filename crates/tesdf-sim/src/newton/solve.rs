@@ -15,6 +15,9 @@ use crate::Residual;
 /// Bodies are wild when they are faster than what moves them by this factor.
 const WILD: f64 = 10.0;
 
+/// Bodies that move by less in a step are not wild, m: rounding moves bodies that nothing moves.
+const STILL: f64 = 1e-8;
+
 /// Fewer rows are solved on the calling thread: that a thread of the pool wakes takes as long as some
 /// hundred rows.
 const ON_ONE_THREAD: usize = 500;
@@ -167,7 +170,7 @@ impl Newton {
             velocities.iter().zip(sizes()).map(speed).fold(0.0, f64::max)
         };
         let asked = asked * sizes().fold(1.0, f64::max);
-        fastest(found) > WILD * (asked + fastest(known[0]).max(fastest(known[1])))
+        fastest(found) > STILL / step.h + WILD * (asked + fastest(known[0]).max(fastest(known[1])))
     }
 }
 

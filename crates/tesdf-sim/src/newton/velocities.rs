@@ -17,9 +17,17 @@ use super::rows::{Resistance, Row, RowForce};
 use super::solve::{Gap, Guess, carry_rows, from_last};
 use super::step::Step;
 use crate::DynamicsError;
+use crate::forces::Forces;
 
-/// The velocities of the free bodies that move the poses, and those that the next step starts from.
-pub type Velocities = [Vec<Vector6<f64>>; 2];
+/// The solution of a step.
+pub struct Solved {
+    /// The velocities of the free bodies that move the poses, ...
+    pub velocities: Vec<Vector6<f64>>,
+    /// ... and those that the next step starts from.
+    pub carried: Vec<Vector6<f64>>,
+    /// The forces that lead to the velocities of the next step, without those that correct poses.
+    pub forces: Forces,
+}
 
 impl Newton {
     /// The velocities that move the poses, and the velocities that the next step starts from.
@@ -27,7 +35,7 @@ impl Newton {
         &mut self,
         step: &mut Step,
         contacts: &[Contact],
-    ) -> Result<Velocities, DynamicsError> {
+    ) -> Result<Solved, DynamicsError> {
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let ways: Vec<f64> = self.ways(step, &start, &step.target).collect();
         let mut reach = Reach::Near(&ways);
@@ -49,7 +57,7 @@ impl Newton {
         contacts: &[Contact],
         start: &[Vector6<f64>],
         near: Reach<'_>,
-    ) -> Result<Option<Velocities>, DynamicsError> {
+    ) -> Result<Option<Solved>, DynamicsError> {
         let all = contacts;
         let contacts = &*self.surfaces.acting(self.system.scene(), all, |c| self.is_deep(c));
         let joints = joint_rows(&self.gaps(step).bodies(), step.h);
@@ -182,17 +190,18 @@ impl Newton {
         let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
         self.close_joints(step, &mut solved, of_joints, &from);
         let Iterate { rows, velocities, forces, .. } = &solved;
-        let carried = match rows.iter().any(|row| row.relaxed_gap != row.gap) {
-            true => self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)).0,
-            false => velocities.clone(),
+        let (carried, carrying) = match rows.iter().any(|row| row.relaxed_gap != row.gap) {
+            true => self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)),
+            false => (velocities.clone(), forces.clone()),
         };
         if far.closes(velocities, step.h) || far.closes(&carried, step.h) {
             return Ok(None);
         }
         let Iterate { rows, velocities, forces, plain, .. } = solved;
+        let reactions = self.reactions(&rows, &carrying, of_joints);
         self.kept.keep(&rows, forces);
         let carried = step.ended(&plain, &velocities, &carried);
-        Ok(Some([velocities, carried]))
+        Ok(Some(Solved { velocities, carried, forces: reactions }))
     }
 
     /// For each free body a bound of the way between the points that these velocities move in a step,

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use tesdf::base::Inside;
 use tesdf::collide::{
-    CoarseContact, CollideError, CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, ShapeId,
-    Velocity, coarse_contacts, detect,
+    CoarseContact, CollideError, CollideOptions, Contacts, Groups, Instance, Mode, Pose, Scene, Shape,
+    ShapeId, Velocity, coarse_contacts, detect,
 };
 use tesdf::encode::{EncodeChoices, EncodeError, EncodeFileError, Encoder, Preset};
-use tesdf::glam::{DQuat, DVec3};
+use tesdf::glam::{DMat3, DQuat, DVec3};
 use tesdf::mesh::{RepairMode, UnknownRepair};
 use tesdf::{Length, Progress, TeSdf};
 
@@ -64,6 +64,7 @@ impl LoadedScene {
                 .map_err(|e| self.body_error(k, instance_reason(e)))?;
             system
                 .set_friction(body, section.friction)
+                .and_then(|()| system.set_restitution(body, section.restitution))
                 .and_then(|()| system.set_angular_damping(body, section.angular_damping))
                 .map_err(|e| self.body_error(k, e.to_string()))?;
         }
@@ -302,18 +303,41 @@ fn mass(system: &System, body: &BodySection, shape: ShapeId) -> Result<Mass, Str
         (false, true) => Some((Mass::Kinematic, "kinematic")),
         (false, false) => None,
     };
+    let by_hand = body.center_of_mass.is_some() || body.inertia.is_some();
+    if by_hand && (body.mass.is_none() || given.is_some()) {
+        return Err("center_of_mass and inertia are of a free body with a mass".into());
+    }
     Ok(match (given, body.density, body.mass) {
         (Some((mass, _)), _, None) => mass,
         (Some((_, word)), _, Some(_)) => {
             return Err(format!("it is {word}, so it needs no mass; take one of the two out"));
         }
         (None, Some(density), None) => Mass::Free(of_density(density)?),
-        (None, None, Some(mass)) => Mass::Free(of_density(1.0)?.with_mass(mass).map_err(|e| e.to_string())?),
+        (None, None, Some(mass)) => Mass::Free(of_mass(body, mass, || of_density(1.0))?),
         (None, Some(_), Some(_)) => return Err("it has a density and a mass; keep one".into()),
         (None, None, None) => {
             return Err("it has neither density nor mass; give one, or fixed = true".into());
         }
     })
+}
+
+/// Mass properties of a body of this mass: what the scene does not give follows from the geometry.
+fn of_mass(
+    body: &BodySection,
+    mass: f64,
+    of_geometry: impl Fn() -> Result<MassProperties, String>,
+) -> Result<MassProperties, String> {
+    let of_geometry = || of_geometry()?.with_mass(mass).map_err(|e| e.to_string());
+    let given = body.inertia.map(|[xx, yy, zz, xy, xz, yz]| {
+        DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz))
+    });
+    let (center, inertia) = match (body.center_of_mass, given) {
+        (None, None) => return of_geometry(),
+        (Some(center), Some(inertia)) => (DVec3::from_array(center), inertia),
+        (Some(center), None) => (DVec3::from_array(center), of_geometry()?.inertia),
+        (None, Some(inertia)) => (of_geometry()?.center, inertia),
+    };
+    MassProperties::new(mass, center, inertia).map_err(|e| e.to_string())
 }
 
 fn instance(body: &BodySection, shape: ShapeId) -> Result<Instance, String> {
@@ -323,7 +347,8 @@ fn instance(body: &BodySection, shape: ShapeId) -> Result<Instance, String> {
         linear: DVec3::from_array(body.velocity),
         angular: DVec3::from_array(body.angular_velocity),
     };
-    Ok(Instance { velocity, scale: body.scale, ..Instance::new(shape, pose) })
+    let groups = Groups { memberships: body.memberships, filter: body.filter };
+    Ok(Instance { velocity, scale: body.scale, groups, ..Instance::new(shape, pose) })
 }
 
 /// The reason alone: the caller's message already names the body.

@@ -55,7 +55,7 @@ fn joint(system: &System, section: &JointSection) -> Result<Joint, String> {
     let frame = Pose::new(anchor, DQuat::from_rotation_arc(DVec3::Z, axis)).map_err(|e| e.to_string())?;
     let poses = [parent.map_or(Pose::IDENTITY, pose), pose(child)];
     let joint = Joint::new(&section.name, section.kind, (parent, child), poses, frame);
-    Ok(Joint { limits: section.limits, motor: section.motor, ..joint })
+    Ok(Joint { limits: section.limits, motor: section.motor, resistance: section.resistance, ..joint })
 }
 
 /// The numbers of two different bodies.

@@ -76,7 +76,7 @@ use crate::criterion::CriterionSection;
 use crate::newton::NewtonOptions;
 use crate::plan::PlanSection;
 use crate::script::Script;
-use crate::{JointKind, Motor};
+use crate::{JointKind, JointResistance, Motor};
 
 /// The content of a scene file, in SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -167,6 +167,9 @@ pub struct JointSection {
     /// Drives a hinge or a slider.
     #[serde(default)]
     pub motor: Option<Motor>,
+    /// Resists the motion of a hinge or a slider.
+    #[serde(default)]
+    pub resistance: JointResistance,
 }
 
 fn up() -> [f64; 3] {
@@ -230,6 +233,13 @@ pub struct BodySection {
     /// Mass, kg.
     #[serde(default)]
     pub mass: Option<f64>,
+    /// Centre of mass in the body's frame, m, of a body with `mass` [default: that of the geometry].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub center_of_mass: Option<[f64; 3]>,
+    /// Inertia about the centre of mass along the axes of the body's frame, kg m², of a body with
+    /// `mass`: xx, yy, zz, xy, xz, yz [default: that of the geometry].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<[f64; 6]>,
     /// Whether the body never moves.
     #[serde(default)]
     pub fixed: bool,
@@ -239,9 +249,23 @@ pub struct BodySection {
     /// Coefficient of friction. Between two bodies the geometric mean of theirs acts.
     #[serde(default)]
     pub friction: f64,
+    /// Coefficient of restitution. Between two bodies the geometric mean of theirs acts.
+    #[serde(default)]
+    pub restitution: f64,
     /// Rate at which the angular velocity of a free body decays, 1/s.
     #[serde(default)]
     pub angular_damping: f64,
+    /// The groups that the body is in, as 32 bits. Two bodies meet where the memberships of each have
+    /// a bit in common with the filter of the other.
+    #[serde(default = "every")]
+    pub memberships: u32,
+    /// The groups that it meets, as 32 bits.
+    #[serde(default = "every")]
+    pub filter: u32,
+}
+
+fn every() -> u32 {
+    u32::MAX
 }
 
 fn one() -> f64 {

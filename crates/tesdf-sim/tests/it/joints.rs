@@ -6,7 +6,9 @@ use tesdf::collide::{
 };
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::newton::{Newton, NewtonOptions};
-use tesdf_sim::{Drive, Dynamics, Joint, JointKind, Mass, MassProperties, Motor, State, System, Wrench};
+use tesdf_sim::{
+    Drive, Dynamics, Joint, JointKind, JointResistance, Mass, MassProperties, Motor, State, System, Wrench,
+};
 
 const G: f64 = 9.81;
 
@@ -212,12 +214,91 @@ fn motors_reach_their_targets_within_their_limits() {
     assert!((speed + 2.0 / mass.mass * 0.1).abs() < 1e-9, "{speed}");
     // A spring with the damping at which it does not overshoot.
     let (k, m) = (20.0, mass.mass);
-    let drive = Drive::Spring { rest: 0.1, stiffness: k, damping: 2.0 * (k * m).sqrt() };
+    let drive =
+        Drive::Spring { rest: 0.1, stiffness: k, damping: 2.0 * (k * m).sqrt(), velocity: 0.0, force: 0.0 };
     let rate = (k / m).sqrt();
     for seconds in [0.1, 0.3] {
         let (travel, _, _) = run(Motor { drive, limit: f64::INFINITY }, JointKind::Slider, seconds);
         let expected = 0.1 * (1.0 - (1.0 + rate * seconds) * (-rate * seconds).exp());
         assert!((travel - expected).abs() < 1e-3, "{travel} instead of {expected}");
+    }
+}
+
+/// A bar on a slider or hinge that resists, with a speed at the start and a motor: its coordinate
+/// and rate at the end.
+fn resisted(
+    kind: JointKind,
+    resistance: JointResistance,
+    speed: f64,
+    motor: Option<Motor>,
+    steps: usize,
+) -> [f64; 2] {
+    let mut links = Links::new(DVec3::ZERO);
+    let bar = links.bar(DVec3::ZERO, 0.0);
+    let poses = [Pose::IDENTITY; 2];
+    let joint = Joint::new("joint", kind, (None, bar), poses, Pose::IDENTITY);
+    links.system.add_joint(Joint { resistance, motor, ..joint }).unwrap();
+    let [linear, angular] = match kind {
+        JointKind::Slider => [speed * DVec3::Z, DVec3::ZERO],
+        _ => [DVec3::ZERO, speed * DVec3::Z],
+    };
+    let mut engine = engine(links.system);
+    let state = State { linear, angular, ..engine.system().states()[bar] };
+    engine.set_state(bar, state).unwrap();
+    advance(&mut engine, steps, H);
+    [engine.system().coordinates()[0], engine.system().coordinate_rates()[0]]
+}
+
+const H: f64 = 1e-3;
+
+#[test]
+fn damping_friction_and_armature_resist() {
+    let inertia_of = |kind| match kind {
+        JointKind::Slider => Links::new(DVec3::ZERO).mass.mass,
+        _ => Links::new(DVec3::ZERO).mass.inertia.z_axis.z,
+    };
+    let none = JointResistance::default();
+    for kind in [JointKind::Slider, JointKind::Hinge] {
+        let m = inertia_of(kind);
+        let motor = |force: f64| Some(Motor { drive: Drive::Force(force), limit: f64::INFINITY });
+        // m v̇ = −d v, by the implicit rule of Euler.
+        let damped = JointResistance { damping: 2.0 * m, ..none };
+        let [_, rate] = resisted(kind, damped, 0.5, None, 300);
+        assert!((rate - 0.5 * (1.0 + 2.0 * H).powi(-300)).abs() < 1e-9, "{kind:?}: {rate}");
+        // Dry friction takes 1 m/s² from a motion, and holds against less.
+        let dry = JointResistance { friction: m, ..none };
+        for (speed, force, steps, expected) in
+            [(0.5, 0.0, 200, 0.3), (0.5, 0.0, 600, 0.0), (0.0, 3.0, 100, 0.2)]
+        {
+            let [_, rate] = resisted(kind, dry, speed, motor(m * force), steps);
+            assert!((rate - expected).abs() < 1e-9, "{kind:?}, {speed}, {force}: {rate}");
+        }
+        let [coordinate, _] = resisted(kind, dry, 0.0, motor(0.9 * m), 300);
+        assert!(coordinate.abs() < 1e-10, "{kind:?}: it crept by {coordinate:e}");
+        // A rotor of three times the inertia.
+        let [_, rate] =
+            resisted(kind, JointResistance { armature: 3.0 * m, ..none }, 0.0, motor(2.0 * m), 400);
+        assert!((rate - 0.2).abs() < 1e-9, "{kind:?}: {rate}");
+    }
+}
+
+/// A spring with a damper that aims at the speed of the target, and the torque of gravity as
+/// feed-forward, follow a target of 1 rad/s.
+#[test]
+fn a_drive_with_feed_forward_tracks_a_moving_target() {
+    let mut links = Links::new(-G * DVec3::Y);
+    let bar = links.bar(0.1 * DVec3::X, 0.0);
+    let hinge = links.hinge(None, bar, DVec3::ZERO);
+    let mass = links.mass;
+    let mut engine = engine(links.system);
+    for step in 1..=2000 {
+        let target = f64::from(step) * H;
+        let force = mass.mass * G * 0.1 * target.cos();
+        let drive = Drive::Spring { rest: target, stiffness: 20.0, damping: 1.0, velocity: 1.0, force };
+        engine.set_motor(hinge, Some(Motor { drive, limit: 50.0 })).unwrap();
+        engine.step(H).unwrap();
+        let off = engine.system().coordinates()[hinge] - target;
+        assert!(step < 500 || off.abs() < 1e-3, "step {step}: off by {off} rad");
     }
 }
 

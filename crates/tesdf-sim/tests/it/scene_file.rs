@@ -168,6 +168,35 @@ fn errors_name_the_line_and_the_body() {
     }
 }
 
+/// Mass properties that the scene gives, and those of the geometry where it does not.
+#[test]
+fn mass_properties_are_given_by_hand() {
+    let mass = |keys: &str| {
+        let text = DROP.replacen("mass = 0.5", &format!("mass = 0.5\n{keys}"), 1);
+        let system = load(&text).unwrap().system().unwrap();
+        let Mass::Free(mass) = system.bodies()[1].mass else { panic!("the brick is fixed") };
+        mass
+    };
+    let of_geometry = mass("");
+    let center = mass("center_of_mass = [0.001, 0, -0.002]");
+    assert_eq!(center.center, DVec3::new(0.001, 0.0, -0.002));
+    assert_eq!(center.inertia, of_geometry.inertia);
+    let inertia = mass("inertia = [3e-4, 4e-4, 5e-4, 1e-5, 2e-5, 3e-5]").inertia;
+    let rows = [[3e-4, 1e-5, 2e-5], [1e-5, 4e-4, 3e-5], [2e-5, 3e-5, 5e-4]];
+    assert_eq!(inertia.to_cols_array_2d(), rows);
+    for (keys, expected) in [
+        ("inertia = [1e-4, 1e-4, 3e-4, 0, 0, 0]", "sum of the others"),
+        ("inertia = [1e-4, -1e-4, 1e-4, 0, 0, 0]", "greater than 0"),
+        ("inertia = [1e-4, nan, 1e-4, 0, 0, 0]", "finite"),
+        ("center_of_mass = [0, inf, 0]", "finite"),
+    ] {
+        let text = refusal(&DROP.replacen("mass = 0.5", &format!("mass = 0.5\n{keys}"), 1));
+        assert!(text.contains("brick") && text.contains(expected), "{text}");
+    }
+    let of_density = refusal(&DROP.replacen("mass = 0.5", "density = 1\ncenter_of_mass = [0, 0, 0]", 1));
+    assert!(of_density.contains("a free body with a mass"), "{of_density}");
+}
+
 #[test]
 fn excluded_bodies_pass_through_each_other() {
     let falls = |text: &str| {
@@ -182,6 +211,13 @@ fn excluded_bodies_pass_through_each_other() {
     assert!((stands - 0.03).abs() < 1e-5, "the brick is at {stands}");
     let fallen = falls(&format!("{DROP}\n[[exclude]]\nbodies = [\"brick\", \"floor\"]\n"));
     assert!(fallen < -0.015, "the brick is at {fallen}");
+    // Groups: the floor is in 1, and the brick meets 2, or both.
+    let in_groups = |filter: u32| {
+        let floor = DROP.replacen("fixed = true", "fixed = true\nmemberships = 1", 1);
+        falls(&floor.replacen("mass = 0.5", &format!("mass = 0.5\nfilter = {filter}"), 1))
+    };
+    assert_eq!(in_groups(2), fallen);
+    assert_eq!(in_groups(3), stands);
 }
 
 #[test]
