@@ -45,11 +45,6 @@ pub struct RepairReport {
 }
 
 impl RepairReport {
-    /// Whether the repaired mesh differs from the input mesh.
-    pub fn changes_something(&self) -> bool {
-        !self.is_unchanged()
-    }
-
     /// Whether nothing was changed.
     pub fn is_unchanged(&self) -> bool {
         self.welded_vertices.is_empty()
