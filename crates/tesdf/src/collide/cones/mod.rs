@@ -255,19 +255,24 @@ impl Body<'_> {
     fn normals(&self, place: &Place) -> Option<Normals> {
         let at = self.placement.to_shape(place.at);
         let limit = place.limit / self.placement.scale;
-        let local = match self.shape {
-            Shape::Plane => [DVec3::Z].into_iter().collect(),
-            Shape::Box { half_extents } => {
-                let side = |axis: usize| {
-                    let sign = if at[axis] < 0.0 { -1.0 } else { 1.0 };
-                    (half_extents[axis] - at[axis].abs() <= limit).then(|| sign * DVec3::AXES[axis])
-                };
-                (0..3).filter_map(side).collect()
-            }
-            Shape::Mesh(asset) => around(asset, at, limit, place.face)?,
-            Shape::Sphere { .. } | Shape::Capsule { .. } => return None,
-        };
         let rotation = self.placement.pose.rotation;
-        (!local.is_empty()).then(|| local.into_iter().map(|n| rotation * n).collect())
+        let mut normals = Normals::new();
+        match self.shape {
+            Shape::Plane => normals.push(rotation * DVec3::Z),
+            Shape::Box { half_extents } => {
+                for axis in 0..3 {
+                    if half_extents[axis] - at[axis].abs() <= limit {
+                        let sign = if at[axis] < 0.0 { -1.0 } else { 1.0 };
+                        normals.push(rotation * (sign * DVec3::AXES[axis]));
+                    }
+                }
+            }
+            Shape::Mesh(asset) => {
+                normals = around(asset, at, limit, place.face)?;
+                normals.iter_mut().for_each(|n| *n = rotation * *n);
+            }
+            Shape::Sphere { .. } | Shape::Capsule { .. } => return None,
+        }
+        (!normals.is_empty()).then_some(normals)
     }
 }

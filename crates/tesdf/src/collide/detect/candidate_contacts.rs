@@ -27,7 +27,7 @@ pub struct AtVertex {
 
 /// Of the contacts of several faces at one vertex, keeps the one whose gradient most opposes its
 /// face; among equals, that of the lowest face.
-pub fn one_per_vertex(contacts: Vec<Contact>, at_vertices: &[AtVertex]) -> Vec<Contact> {
+pub fn one_per_vertex(mut contacts: Vec<Contact>, at_vertices: &[AtVertex]) -> Vec<Contact> {
     if at_vertices.is_empty() {
         return contacts;
     }
@@ -37,7 +37,14 @@ pub fn one_per_vertex(contacts: Vec<Contact>, at_vertices: &[AtVertex]) -> Vec<C
         ((instance_a, instance_b, vertex), (cosine * 1e9).round() as i64, face_a, index)
     };
     let keep = kept_at_vertices(at_vertices.iter().map(key).collect(), contacts.len());
-    contacts.into_iter().zip(keep).filter_map(|(contact, keep)| keep.then_some(contact)).collect()
+    retain(&mut contacts, keep);
+    contacts
+}
+
+/// Keeps the contacts for which `keep` says so, in order.
+pub fn retain(contacts: &mut Vec<Contact>, keep: impl IntoIterator<Item = bool>) {
+    let mut keep = keep.into_iter();
+    contacts.retain(|_| keep.next().unwrap_or(true));
 }
 
 /// For each of `count` contacts: whether it is kept. Of those with the same vertex, the one with
@@ -68,32 +75,34 @@ pub struct Found {
 /// Middle phase, narrow phase and filters.
 pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut found = Found::default();
-    if matches!(pair.field.field, Field::Simple(_)) {
-        for &candidate in candidates {
-            found.add(pair, candidate, &pair.part(candidate), None);
-        }
-        return found;
-    }
-    let parts: Vec<(Part, u32, u32)> = candidates.iter().map(|&candidate| pair.part(candidate)).collect();
-    let mut rest = parts.as_slice();
-    let mut next = candidates.iter();
-    while !rest.is_empty() {
-        let of_faces = pair.search.is_of_faces();
-        let (group, others) = rest.split_at(if of_faces { near_each_other(rest) } else { rest.len() });
-        rest = others;
-        let parts = || group.iter().map(|(part, ..)| part);
-        let around = match of_faces {
-            true => pair.search_of(parts()).surroundings(&pair.field, parts()),
-            false => None,
-        };
-        for (part, &candidate) in group.iter().zip(&mut next) {
-            found.add(pair, candidate, part, around.as_ref());
-        }
-    }
+    found.extend(pair, candidates);
     found
 }
 
 impl Found {
+    /// Adds the contacts of more candidates.
+    pub fn extend(&mut self, pair: &OrderedPair, candidates: &[u32]) {
+        if matches!(pair.field.field, Field::Simple(_)) {
+            return candidates.iter().for_each(|&k| self.add(pair, k, &pair.part(k), None));
+        }
+        let parts: Vec<(Part, u32, u32)> = candidates.iter().map(|&candidate| pair.part(candidate)).collect();
+        let mut rest = parts.as_slice();
+        let mut next = candidates.iter();
+        while !rest.is_empty() {
+            let of_faces = pair.search.is_of_faces();
+            let (group, others) = rest.split_at(if of_faces { near_each_other(rest) } else { rest.len() });
+            rest = others;
+            let parts = || group.iter().map(|(part, ..)| part);
+            let around = match of_faces {
+                true => pair.search_of(parts()).surroundings(&pair.field, parts()),
+                false => None,
+            };
+            for (part, &candidate) in group.iter().zip(&mut next) {
+                self.add(pair, candidate, part, around.as_ref());
+            }
+        }
+    }
+
     /// Adds the contacts of a candidate. `part` is its [`part`](OrderedPair::part), and `around` the
     /// mesh around it, where that is known.
     fn add(

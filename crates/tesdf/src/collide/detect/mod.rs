@@ -16,7 +16,7 @@ use crate::parallel::*;
 
 use crate::collide::bodies::surface::Candidates;
 use crate::collide::cones::{Cones, keep_different};
-use crate::collide::detect::candidate_contacts::{AtVertex, Found, contacts, one_per_vertex, order};
+use crate::collide::detect::candidate_contacts::{AtVertex, Found, contacts, one_per_vertex, order, retain};
 use crate::collide::detect::ordered_pair::OrderedPair;
 use crate::collide::mode::ContactsPer;
 use crate::collide::options::{CollideOptions, Reduction};
@@ -129,7 +129,7 @@ pub fn tasks<'p, 's>(
 
 /// The contacts without those that have a twin in their pair of instances. The two orders of a pair
 /// are adjacent.
-fn different(contacts: Vec<Contact>, pairs: &[OrderedPair]) -> Vec<Contact> {
+fn different(mut contacts: Vec<Contact>, pairs: &[OrderedPair]) -> Vec<Contact> {
     let ids = |a: InstanceId, b: InstanceId| (a.min(b), a.max(b));
     let of = |c: &Contact| ids(c.instance_a, c.instance_b);
     let mut pairs = pairs.iter();
@@ -144,7 +144,8 @@ fn different(contacts: Vec<Contact>, pairs: &[OrderedPair]) -> Vec<Contact> {
         None => vec![true; run.len()],
     };
     let kept: Vec<Vec<bool>> = runs.par_iter().map(kept).collect();
-    contacts.iter().zip(kept.iter().flatten()).filter_map(|(c, keep)| keep.then_some(*c)).collect()
+    retain(&mut contacts, kept.into_iter().flatten());
+    contacts
 }
 
 /// The contacts of ordered pairs. Once `stop` is set, contacts are missing.
@@ -179,7 +180,12 @@ fn of_pairs_by(
         if stopped() { Found::default() } else { contacts(pair, chunk) }
     };
     let found: Vec<Found> = match is_small {
-        true => tasks.iter().map(contacts_of).collect(),
+        true => {
+            let mut all = Found::default();
+            let open = tasks.iter().take_while(|_| !stopped());
+            open.for_each(|(pair, chunk)| all.extend(pair, chunk));
+            vec![all]
+        }
         false => tasks.par_iter().map(contacts_of).collect(),
     };
     let mut statistics = Statistics {
