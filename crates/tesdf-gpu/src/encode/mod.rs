@@ -13,7 +13,7 @@ pub use count::{SampleCounter, SampleCounts};
 use face::CandidateFace;
 
 use crate::GpuError;
-use crate::device::Device;
+use crate::device::{Device, spread};
 use crate::kernels::counters;
 use crate::kernels::encode::sampled::{self as kernel, FACE_ROWS, GROUP, SamplesLaunch, sample};
 
@@ -125,10 +125,9 @@ impl DeviceSampler {
             if progress.is_cancelled() {
                 return Err(EncodeError::Cancelled);
             }
-            let wide = groups.min(MAX_GROUPS);
             sample::launch(
                 device.client(),
-                CubeCount::Static(wide as u32, groups.div_ceil(wide) as u32, 1),
+                spread(groups as u32),
                 CubeDim::new_1d(GROUP as u32),
                 SamplesLaunch::new(
                     rows.rows(),

@@ -10,7 +10,7 @@ pub use arrays::DeviceAnswers;
 use crate::GpuError;
 use crate::collide::scene::placed::{FieldFrame, Placed, split};
 use crate::collide::scene::{GpuShapeId, GpuShapes};
-use crate::device::Buffer;
+use crate::device::{Buffer, spread};
 use crate::kernels::query::batch::{
     ANSWER_ROWS, AnswersLaunch, BatchLaunch, FARTHEST, InstancesLaunch, signed_distances,
 };
@@ -84,7 +84,7 @@ impl GpuShapes {
             let count = LAUNCH.min(all - first);
             signed_distances::launch(
                 device.client(),
-                CubeCount::Static((count as u32).div_ceil(GROUP), 1, 1),
+                spread((count as u32).div_ceil(GROUP)),
                 CubeDim::new_1d(GROUP),
                 self.argument(),
                 placed.argument(),
