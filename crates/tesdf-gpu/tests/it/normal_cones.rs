@@ -32,6 +32,10 @@ fn faces_of_vertices_are_uploaded_when_they_are_needed() {
 /// From the rounding of `f32` on.
 const GAPS: [f64; 7] = [0.0, 1e-6, -1e-6, 1e-5, -1e-5, 5e-5, -5e-5];
 
+/// What kernels find, and leave there.
+const ON_DEVICE: [(Mode, ContactsPer); 3] =
+    [(Mode::exact(), ContactsPer::Cell), (Mode::exact(), ContactsPer::Face), (Mode::face(), ContactsPer::Cell)];
+
 /// The diagonal of the floor is 3.
 const KNOWN: Known = Known { near: 3.0 * ROUNDING, tolerance: 3.0 * ROUNDING, direction: 1e-6 };
 
@@ -41,14 +45,13 @@ fn edges_are_pushed_along_the_normal_of_the_floor_in_each_mode() {
         found(scene, options, DetectorOptions::default()).0.into_vec()
     };
     let known = Known { direction: 1e-9, ..KNOWN };
-    let kinds = [ContactsPer::Cell, ContactsPer::Face, ContactsPer::Minimum];
+    let kinds = [&ON_DEVICE[..], &[(Mode::exact(), ContactsPer::Minimum)]].concat();
     edges_are_pushed_along_the_normal_of_the_floor(&detect, &kinds, known);
 }
 
 #[test]
 fn edges_are_pushed_along_the_normal_of_the_floor_on_the_device() {
-    let kinds = [ContactsPer::Cell, ContactsPer::Face];
-    edges_are_pushed_along_the_normal_of_the_floor(&staying, &kinds, KNOWN);
+    edges_are_pushed_along_the_normal_of_the_floor(&staying, &ON_DEVICE, KNOWN);
 }
 
 #[test]

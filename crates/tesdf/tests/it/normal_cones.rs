@@ -84,7 +84,8 @@ fn edges_are_pushed_along_the_normal_of_the_floor_in_each_mode() {
         |scene: &Scene, options: &CollideOptions| detect(scene, options).expect("contacts").into_vec();
     // Of the diagonals: 1e-6 of the smaller one, and the tolerance of the larger one.
     let known = Known { near: 7.8e-7, tolerance: 7.8e-7, direction: 1e-9 };
-    let kinds = [ContactsPer::Cell, ContactsPer::Face, ContactsPer::Minimum];
+    let each = [ContactsPer::Cell, ContactsPer::Face, ContactsPer::Minimum];
+    let kinds = [Mode::exact(), Mode::face()].map(|mode| each.map(|per| (mode, per))).concat();
     blocks::edges_are_pushed_along_the_normal_of_the_floor(&detect, &kinds, known);
 }
 

@@ -79,13 +79,12 @@ pub struct Known {
 /// Contacts up to this distance.
 const CONTACT_DISTANCE: f64 = 2e-3;
 
-/// Contacts of a floor's face with an edge or a corner of a box have the normal of the floor, in each
-/// mode of faces and for each kind of contacts: those right over each other. All others, but the
-/// minima, are along the way between their points, as far as these are known (`docs/math.md`, section
-/// 18).
+/// Contacts of a floor's face with an edge or a corner of a box have the normal of the floor, in these
+/// modes and for these kinds of contacts: those right over each other. All others, but the minima, are
+/// along the way between their points, as far as these are known (`docs/math.md`, section 18).
 pub fn edges_are_pushed_along_the_normal_of_the_floor(
     detect: &dyn Fn(&Scene, &CollideOptions) -> Vec<Contact>,
-    kinds: &[ContactsPer],
+    kinds: &[(Mode, ContactsPer)],
     Known { near, tolerance, direction }: Known,
 ) {
     let mut random = Random(29);
@@ -120,39 +119,37 @@ pub fn edges_are_pushed_along_the_normal_of_the_floor(
             }
         }
     }
-    for mode in [Mode::exact(), Mode::face()] {
-        for &contacts_per in kinds {
-            let options = CollideOptions {
-                contact_distance: CONTACT_DISTANCE,
-                ..CollideOptions::with_mode(mode.per(contacts_per))
-            };
-            let found = detect(&scene, &options);
-            let mut with_edge = vec![0; worlds.len()];
-            for c in &found {
-                let world = c.instance_a.0 as usize / 2;
-                // Well within the limit.
-                if is_of_edge(&worlds[world], c, 0.4 * near) {
-                    let up = if is_floor(c.instance_a) { -c.normal } else { c.normal };
-                    assert!(up.distance(DVec3::Z) < direction, "{mode:?} per {contacts_per:?}: {c:?}");
-                    with_edge[world] += usize::from(is_floor(c.instance_a));
-                } else if contacts_per != ContactsPer::Minimum {
-                    let way = c.point_a - c.point_b;
-                    let off = way.distance(c.distance * c.normal);
-                    let known = 1.1 * near + (8.0 * tolerance * c.distance.abs()).sqrt();
-                    assert!(off <= known, "{off} beside the way, {mode:?} per {contacts_per:?}: {c:?}");
-                }
+    for &(mode, contacts_per) in kinds {
+        let options = CollideOptions {
+            contact_distance: CONTACT_DISTANCE,
+            ..CollideOptions::with_mode(mode.per(contacts_per))
+        };
+        let found = detect(&scene, &options);
+        let mut with_edge = vec![0; worlds.len()];
+        for c in &found {
+            let world = c.instance_a.0 as usize / 2;
+            // Well within the limit.
+            if is_of_edge(&worlds[world], c, 0.4 * near) {
+                let up = if is_floor(c.instance_a) { -c.normal } else { c.normal };
+                assert!(up.distance(DVec3::Z) < direction, "{mode:?} per {contacts_per:?}: {c:?}");
+                with_edge[world] += usize::from(is_floor(c.instance_a));
+            } else if contacts_per != ContactsPer::Minimum {
+                let way = c.point_a - c.point_b;
+                let off = way.distance(c.distance * c.normal);
+                let known = 1.1 * near + (8.0 * tolerance * c.distance.abs()).sqrt();
+                assert!(off <= known, "{off} beside the way, {mode:?} per {contacts_per:?}: {c:?}");
             }
-            // In the others, points are known less well than this. Frank–Wolfe seldom comes so near
-            // to the lowest point, and over a cell never.
-            let least = match (mode, contacts_per) {
-                (Mode::Node | Mode::Exact(_), _) => worlds.len() / 2,
-                (Mode::Face { .. }, ContactsPer::Face | ContactsPer::Minimum) => worlds.len() / 8,
-                (Mode::Face { .. }, ContactsPer::Cell) => 0,
-            };
-            let seen = with_edge.iter().filter(|&&count| count > 0).count();
-            println!("{mode:?} per {contacts_per:?}: {seen} of {} worlds, {with_edge:?}", worlds.len());
-            assert!(seen >= least, "{mode:?} per {contacts_per:?}: {with_edge:?}");
         }
+        // In the others, points are known less well than this. Frank–Wolfe seldom comes so near to the
+        // lowest point, and over a cell never.
+        let least = match (mode, contacts_per) {
+            (Mode::Node | Mode::Exact(_), _) => worlds.len() / 2,
+            (Mode::Face { .. }, ContactsPer::Face | ContactsPer::Minimum) => worlds.len() / 8,
+            (Mode::Face { .. }, ContactsPer::Cell) => 0,
+        };
+        let seen = with_edge.iter().filter(|&&count| count > 0).count();
+        println!("{mode:?} per {contacts_per:?}: {seen} of {} worlds, {with_edge:?}", worlds.len());
+        assert!(seen >= least, "{mode:?} per {contacts_per:?}: {with_edge:?}");
     }
 }
 
