@@ -9,9 +9,9 @@ use tesdf_sim::{HiddenPair, RunRecord, Summary};
 
 use super::plot::{Curve, Plot, Scale};
 use super::scene::Pile;
-use super::{PileArgs, Shaft, e_max};
+use super::{PileArgs, Shaft, Study, e_max};
 use crate::tables::detector::Shared;
-use crate::tables::output::{Sink, Text, open_in_folder, short};
+use crate::tables::output::{Text, short};
 use crate::tables::paper;
 use tesdf_cli::terminal::output;
 use tesdf_cli::terminal::progress::Bar;
@@ -28,17 +28,13 @@ pub struct Args {
     pub runs: Option<PathBuf>,
 }
 
-/// The output of `--format json`.
 #[derive(Serialize)]
-struct Figure {
-    figure: u32,
-    quick: bool,
-    device: String,
-    shafts: usize,
+struct Settings {
     time_step: f64,
     criterion: SeparationCriterion,
-    rows: Vec<Row>,
 }
+
+type Figure = super::Figure<Settings, Row>;
 
 /// A run, and what it says.
 #[derive(Serialize)]
@@ -116,23 +112,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let pile_args = &args.pile;
     let bar = Bar::new("encoding");
     let detector = Shared::open(&pile_args.device)?;
-    let pile = Pile::read(pile_args)?;
-    let inputs = pile.loaded.geometry_files();
-    let sink = Sink::open(&pile_args.output, "fig8", &inputs)?;
-    let picture = open_in_folder(&pile_args.output, "fig8.svg", &inputs)?;
+    let study = Study::open(pile_args, 8)?;
+    let pile = &study.pile;
     let criterion = pile.loaded.scene.criterion.get::<SeparationCriterion>().cloned();
     let criterion = criterion.filter(|of| !of.limits.is_empty()).ok_or_else(|| {
         Failure::new(format!("{}: it has no criterion.separation", pile.loaded.path.display()))
     })?;
-    let mut figure = Figure {
-        figure: 8,
-        quick: pile_args.quick,
-        device: pile_args.device.to_string(),
-        shafts: pile.exact.bodies().len() - 1,
-        time_step: pile.loaded.scene.time_step,
-        criterion,
-        rows: Vec::new(),
-    };
+    let settings = Settings { time_step: pile.loaded.scene.time_step, criterion };
+    let limit = settings.criterion.limits[0][1];
+    let mut figure: Figure = study.figure(pile_args, pile_args.device.to_string(), settings);
     for &domain in &pile_args.domain {
         let shaft = Shaft::open(pile_args, domain)?;
         for max_entries in [Some(paper::FIGURE_8_MAX_ENTRIES), None] {
@@ -144,9 +132,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 bar.stage("simulating");
                 let (record, summary) = pile.simulate(system.clone(), mode, detector.clone(), &bar)?;
                 bar.stage("measuring penetrations");
-                let measured = measure(&pile, &figure.criterion, &record, &bar)?;
+                let measured = measure(pile, &figure.settings.criterion, &record, &bar)?;
                 let setting = (mode, max_entries, longest_list);
-                let row = Row::new(&shaft, setting, &summary, measured, figure.criterion.limits[0][1]);
+                let row = Row::new(&shaft, setting, &summary, measured, limit);
                 note(&format!("{}: {} {}", row.title(), row.verdict(), row.failures.join("; ")));
                 if let Some(folder) = &args.runs {
                     save(&record, folder, &row, pile_args)?;
@@ -155,10 +143,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             }
         }
     }
-    if let Some(picture) = picture {
-        output::write(&picture, plot(&figure).svg().as_bytes())?;
-    }
-    sink.print(&figure, &csv(&figure), &markdown(&figure))
+    study.print(&figure, &csv(&figure), &markdown(&figure), &plot(&figure))
 }
 
 /// Measures the penetrations of a run. The fields are exact, whatever those of the run were.
@@ -196,7 +181,7 @@ fn csv(figure: &Figure) -> Text {
             e_max(row.max_entries),
             row.success.to_string(),
             frame.to_string(),
-            (frame as f64 * figure.time_step).to_string(),
+            (frame as f64 * figure.settings.time_step).to_string(),
             depth.to_string(),
         ]
     };
@@ -258,20 +243,19 @@ fn markdown(figure: &Figure) -> String {
         columns: std::iter::once("frame".to_string()).chain(numbers).collect(),
         rows: (0..frames).map(line).collect(),
     };
-    let limits = figure.criterion.limits.iter();
-    let limits = limits.map(|[t, d]| format!("{:.0} µm from frame {:.0} on", d * 1e6, t / figure.time_step));
-    let failed = figure.rows.iter().enumerate().filter(|(_, row)| !row.success);
-    let failed: String =
-        failed.map(|(k, row)| format!("- run {}: {}\n", k + 1, row.failures.join("; "))).collect();
+    let Settings { time_step, criterion } = &figure.settings;
+    let limits = criterion.limits.iter();
+    let limits = limits.map(|[t, d]| format!("{:.0} µm from frame {:.0} on", d * 1e6, t / time_step));
     format!(
         "{}\n{} shafts, steps of {} ms, contacts found on: {}. Criterion: {}; kinetic energy at most {} of \
-         that of free fall.\n\n{runs}\n{failed}\nGreatest penetration by the exact clearance, µm:\n\n{}",
+         that of free fall. S: the run meets it, F: [fig8.json](fig8.json) says why not.\n\n{runs}\n\
+         Greatest penetration by the exact clearance, µm:\n\n{}",
         crate::heading::lines(),
         figure.shafts,
-        figure.time_step * 1e3,
+        time_step * 1e3,
         figure.device,
         limits.collect::<Vec<_>>().join(", "),
-        figure.criterion.max_kinetic_energy,
+        criterion.max_kinetic_energy,
         by_frame.markdown(0)
     )
 }

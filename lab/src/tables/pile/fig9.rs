@@ -8,14 +8,13 @@ use tesdf_sim::{RunRecord, System};
 
 use super::plot::{Curve, Plot, Scale};
 use super::scene::Pile;
-use super::{PileArgs, Shaft};
+use super::{PileArgs, Shaft, Study};
 use crate::detection::frames::Frames;
 use crate::detection::report::{Spread, ms};
 use crate::tables::detector::Shared;
-use crate::tables::output::{Sink, Text, open_in_folder, or_dash, short};
+use crate::tables::output::{Text, or_dash, short};
 use crate::tables::paper;
 use tesdf_cli::terminal::device::Device;
-use tesdf_cli::terminal::output;
 use tesdf_cli::terminal::progress::Bar;
 use tesdf_cli::terminal::report::{Failure, note};
 
@@ -30,16 +29,12 @@ pub struct Args {
     pub repeat: Option<u32>,
 }
 
-/// The output of `--format json`.
 #[derive(Serialize)]
-struct Figure {
-    figure: u32,
-    quick: bool,
-    device: String,
-    shafts: usize,
+struct Settings {
     repeat: u32,
-    rows: Vec<Row>,
 }
+
+type Figure = super::Figure<Settings, Row>;
 
 /// A frame of the pile, detected with lists of at most E_max faces.
 #[derive(Clone, Debug, Serialize)]
@@ -137,25 +132,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let pile_args = &args.pile;
     let bar = Bar::new("encoding");
     let device = pile_args.device.open()?;
-    let pile = Pile::read(pile_args)?;
-    let inputs = pile.loaded.geometry_files();
-    let sink = Sink::open(&pile_args.output, "fig9", &inputs)?;
-    let picture = open_in_folder(&pile_args.output, "fig9.svg", &inputs)?;
+    let study = Study::open(pile_args, 9)?;
+    let pile = &study.pile;
     bar.stage("simulating");
     let (record, _) =
         pile.simulate(pile.exact.clone(), DetectorMode::Exact, Shared::open(&Default::default())?, &bar)?;
-    let mut figure = Figure {
-        figure: 9,
-        quick: pile_args.quick,
-        device: device.as_ref().map_or("cpu".into(), |device| device.name().to_string()),
-        shafts: pile.exact.bodies().len() - 1,
-        repeat: args.repeat(),
-        rows: Vec::new(),
-    };
+    let device_name = device.as_ref().map_or("cpu".into(), |device| device.name().to_string());
+    let mut figure: Figure = study.figure(pile_args, device_name, Settings { repeat: args.repeat() });
     for &domain in &pile_args.domain {
         let shaft = Shaft::open(pile_args, domain)?;
         bar.stage("encoding");
-        let settings = args.max_entries().into_iter().map(|e| Setting::new(&pile, &shaft, e));
+        let settings = args.max_entries().into_iter().map(|e| Setting::new(pile, &shaft, e));
         let settings = settings.collect::<Result<Vec<_>, _>>()?;
         for (frame, step) in [("start", 0), ("end", record.steps() as usize)] {
             bar.stage("detecting");
@@ -174,10 +161,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             figure.rows.extend(rows);
         }
     }
-    if let Some(picture) = picture {
-        output::write(&picture, plot(&figure).svg().as_bytes())?;
-    }
-    sink.print(&figure, &csv(&figure), &markdown(&figure))
+    study.print(&figure, &csv(&figure), &markdown(&figure), &plot(&figure))
 }
 
 fn poses(record: &RunRecord, step: usize) -> Result<Vec<Pose>, Failure> {
@@ -320,7 +304,7 @@ fn markdown(figure: &Figure) -> String {
         crate::heading::lines(),
         figure.shafts,
         figure.device,
-        figure.repeat
+        figure.settings.repeat
     )
 }
 

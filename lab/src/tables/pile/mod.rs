@@ -10,14 +10,20 @@ mod scene;
 
 use std::path::PathBuf;
 
+use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::encode::Deformation;
+use tesdf::save::Destination;
 
 use super::domains::{Subject, open};
 use super::measure::{Cells, Setup};
 use super::meshes::{MESHES, SHAFT};
+use super::output::{Sink, Text, open_in_folder};
 use super::{DomainName, OutputArgs};
+use plot::Plot;
+use scene::Pile;
 use tesdf_cli::terminal::device::{self, Choice};
+use tesdf_cli::terminal::output;
 use tesdf_cli::terminal::report::Failure;
 
 /// What both figures need.
@@ -44,6 +50,62 @@ pub struct PileArgs {
     /// Where the result goes.
     #[command(flatten)]
     pub output: OutputArgs,
+}
+
+/// The output of `--format json`, with the settings of the figure.
+#[derive(Serialize)]
+struct Figure<Settings, Row> {
+    figure: u32,
+    quick: bool,
+    device: String,
+    shafts: usize,
+    #[serde(flatten)]
+    settings: Settings,
+    rows: Vec<Row>,
+}
+
+/// The pile, and where the measurements of a figure go.
+struct Study {
+    number: u32,
+    pile: Pile,
+    sink: Sink,
+    picture: Option<Destination>,
+}
+
+impl Study {
+    /// Reads the pile for a figure of this number.
+    ///
+    /// # Errors
+    /// The scene or its mesh cannot be read, or a file cannot be written.
+    fn open(args: &PileArgs, number: u32) -> Result<Self, Failure> {
+        let pile = Pile::read(args)?;
+        let (name, inputs) = (format!("fig{number}"), pile.loaded.geometry_files());
+        let sink = Sink::open(&args.output, &name, &inputs)?;
+        let picture = open_in_folder(&args.output, &format!("{name}.svg"), &inputs)?;
+        Ok(Self { number, pile, sink, picture })
+    }
+
+    /// The figure, still without rows. Its contacts are found on `device`.
+    fn figure<Settings, Row>(
+        &self,
+        args: &PileArgs,
+        device: String,
+        settings: Settings,
+    ) -> Figure<Settings, Row> {
+        let shafts = self.pile.exact.bodies().len() - 1;
+        Figure { figure: self.number, quick: args.quick, device, shafts, settings, rows: Vec::new() }
+    }
+
+    /// Writes the curves, and prints the figure.
+    ///
+    /// # Errors
+    /// Stdout or a file cannot be written.
+    fn print(&self, figure: &impl Serialize, csv: &Text, markdown: &str, plot: &Plot) -> Result<(), Failure> {
+        if let Some(picture) = &self.picture {
+            output::write(picture, plot.svg().as_bytes())?;
+        }
+        self.sink.print(figure, csv, markdown)
+    }
 }
 
 /// The shaft in a domain, ready to be encoded.

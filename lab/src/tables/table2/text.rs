@@ -130,11 +130,9 @@ pub fn markdown(table: &Table) -> String {
     }
     let frames = table.rows.first().map_or(0, |row| row.frames);
     format!(
-        "{}\nUp to {frames} recorded frames of each scenario, {} measurements of each. Encoded with the preset {}; \
-         contacts are found on: {}. Memory in MiB: in the paper's account each body counts, *resident* is all that is in \
-         memory, with contacts. The columns up to the first *contacts* are Face-TES with K = 16 and cos θ = 0.3, one query \
-         for each polygon of a face in a cell; those after it are for the exact minimum, one query for each face, and \
-         local minima as contacts, on the processor. The paper's times are those of an RTX 5090.\n\n{}",
+        "{}\nUp to {frames} recorded frames, {} measurements of each, preset {}, contacts found on: {}; the paper \
+         measured on an RTX 5090. Memory in MiB. The columns up to the first *contacts* are Face-TES with K = 16 and \
+         cos θ = 0.3; those after it are the exact minimum with local minima as contacts, on the processor.\n\n{}",
         crate::heading::lines(),
         table.repeat,
         table.preset,
