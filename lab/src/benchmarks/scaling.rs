@@ -25,6 +25,9 @@ pub struct Args {
     /// Number of repetitions; the fastest one counts
     #[arg(long, default_value_t = 5)]
     repeats: usize,
+    /// Leave out scenes of more instances
+    #[arg(long, value_name = "N", default_value_t = 2048)]
+    max_instances: usize,
 }
 
 const COLUMNS: [&str; 7] = [
@@ -60,28 +63,30 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let modes = [("node", Mode::Node), ("exact", Mode::exact())];
     for (name, mode) in modes {
         let options = CollideOptions::with_mode(mode);
-        let scenes = ROWS.map(|n| (n, row(&link, n)));
-        print(&format!("row, {name}"), args.repeats, &options, scenes)?;
+        let scenes = ROWS.map(|n| (n, n));
+        print(&format!("row, {name}"), args, &options, scenes, |n| row(&link, n))?;
     }
     for ((name, mode), worlds_of_mode) in modes.into_iter().zip(WORLDS) {
         let options =
             CollideOptions { contact_distance: CONTACT_DISTANCE, ..CollideOptions::with_mode(mode) };
-        let scenes = worlds_of_mode.map(|n| (2 * n as usize, worlds(&nut, &bolt, n)));
-        print(&format!("worlds, {name}"), args.repeats, &options, scenes)?;
+        let scenes = worlds_of_mode.map(|n| (2 * n as usize, n));
+        print(&format!("worlds, {name}"), args, &options, scenes, |n| worlds(&nut, &bolt, n))?;
     }
     Ok(())
 }
 
-fn print(
+/// `sizes` are numbers of instances, and what `make` makes such a scene from.
+fn print<Size>(
     name: &str,
-    repeats: usize,
+    args: &Args,
     options: &CollideOptions,
-    scenes: [(usize, Result<Scene, Failure>); 4],
+    sizes: [(usize, Size); 4],
+    make: impl Fn(Size) -> Result<Scene, Failure>,
 ) -> Result<(), Failure> {
     let mut smallest = None;
-    for (instances, scene) in scenes {
-        let scene = scene?;
-        let (contacts, seconds) = quickest(&scene, options, repeats)?;
+    for (instances, size) in sizes.into_iter().filter(|(instances, _)| *instances <= args.max_instances) {
+        let scene = make(size)?;
+        let (contacts, seconds) = quickest(&scene, options, args.repeats)?;
         let each = seconds / contacts.len().max(1) as f64;
         let first = *smallest.get_or_insert(each);
         output::row(&[
