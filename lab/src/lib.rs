@@ -3,6 +3,7 @@
 //! - [`tables`]: Tables I to IV and Figures 8 and 9 of the paper, beside the paper's figures.
 //! - [`detection`]: detection stage by stage, on the processor or on a device.
 //! - [`benchmarks`]: the tables of `docs/benchmarks.md`, and ratios to peers.
+//! - [`scenes`]: scenes of the paper whose criteria the house does not have.
 //! - [`on_grid`]: errors of encoded distances on a grid, for Tables I and IV.
 //! - [`voxel`]: voxel grids, which Table III compares with.
 //!
@@ -11,13 +12,14 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use tesdf::base::Isa;
-use tesdf_cli::terminal::report;
+use tesdf_cli::terminal::report::{self, Outcome};
 
 pub mod benchmarks;
 pub mod detection;
 pub mod heading;
 pub mod on_grid;
 pub mod reference;
+pub mod scenes;
 pub mod tables;
 pub mod voxel;
 
@@ -40,6 +42,9 @@ enum Command {
     Detection(detection::Command),
     #[command(flatten)]
     Benchmark(benchmarks::Command),
+    /// Simulate the bodies of a scene and write the run, as `tesdf simulate` does, with the criteria
+    /// of the scenes in `lab/scenes`, too
+    Simulate(scenes::Args),
 }
 
 /// Reads the name of an instruction set that this processor has.
@@ -63,12 +68,14 @@ pub fn main() -> ExitCode {
         isa.limit_to();
     }
     let result = match &cli.command {
-        Command::Table(table) => tables::run(table),
-        Command::Detection(command) => detection::run(command),
-        Command::Benchmark(command) => benchmarks::run(command),
+        Command::Table(table) => tables::run(table).map(|()| Outcome::Good),
+        Command::Detection(command) => detection::run(command).map(|()| Outcome::Good),
+        Command::Benchmark(command) => benchmarks::run(command).map(|()| Outcome::Good),
+        Command::Simulate(args) => scenes::run(args),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(Outcome::Good) => ExitCode::SUCCESS,
+        Ok(Outcome::NotGood) => ExitCode::from(1),
         Err(failure) => {
             report::error(&failure);
             ExitCode::from(2)

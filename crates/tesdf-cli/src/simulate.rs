@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::Progress;
+use tesdf_sim::criterion::Criteria;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
@@ -104,8 +105,22 @@ impl Args {
 /// is unchanged; afterwards it holds the steps so far. A run that does not meet the scene's
 /// criterion is written and has exit code 1.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    run_with(args, &Criteria::standard(), |_| Ok(()))
+}
+
+/// As [`run`], for scenes that may have these criteria. A scene file is changed by `change` once it is
+/// read.
+///
+/// # Errors
+/// The same errors as [`run`], and those of `change`.
+pub fn run_with(
+    args: &Args,
+    criteria: &Criteria,
+    change: impl FnOnce(&mut LoadedScene) -> Result<(), Failure>,
+) -> Result<Outcome, Failure> {
     let earlier = args.resume.as_deref().map(open_interrupted).transpose()?;
-    let loaded = load(args, earlier.as_ref())?;
+    let mut loaded = read(args, earlier.as_ref(), criteria, change)?;
+    replace_values(&mut loaded, args)?;
     let mut inputs = loaded.geometry_files();
     inputs.extend(args.scene.clone());
     let output = output::open(args.output(), &inputs, args.consent)?;
@@ -180,13 +195,24 @@ fn begin(
     Ok(earlier.run.clone())
 }
 
-/// The scene, with the values that the command line replaces.
-fn load(args: &Args, earlier: Option<&InterruptedRun>) -> Result<LoadedScene, Failure> {
-    let loaded = match (&args.scene, earlier) {
-        (None, Some(earlier)) => LoadedScene::of_run(&earlier.run.record, args.source()),
-        _ => LoadedScene::read(args.source()),
-    };
-    let mut loaded = loaded.map_err(Failure::new)?;
+/// The scene of the file, or of the run that is resumed.
+fn read(
+    args: &Args,
+    earlier: Option<&InterruptedRun>,
+    criteria: &Criteria,
+    change: impl FnOnce(&mut LoadedScene) -> Result<(), Failure>,
+) -> Result<LoadedScene, Failure> {
+    if let (None, Some(earlier)) = (&args.scene, earlier) {
+        let record = &earlier.run.record;
+        return LoadedScene::of_run_with(record, args.source(), criteria).map_err(Failure::new);
+    }
+    let mut loaded = LoadedScene::read_with(args.source(), criteria).map_err(Failure::new)?;
+    change(&mut loaded)?;
+    Ok(loaded)
+}
+
+/// Replaces the values of the scene that the command line gives.
+fn replace_values(loaded: &mut LoadedScene, args: &Args) -> Result<(), Failure> {
     let scene = &mut loaded.scene;
     scene.time_step = args.time_step.unwrap_or(scene.time_step);
     scene.duration = args.duration.unwrap_or(scene.duration);
@@ -200,8 +226,7 @@ fn load(args: &Args, earlier: Option<&InterruptedRun>) -> Result<LoadedScene, Fa
     if let Some(mode) = args.mode {
         scene.detector.choose(mode);
     }
-    replace_geometries(&mut loaded, &args.geometries, args.source())?;
-    Ok(loaded)
+    replace_geometries(loaded, &args.geometries, args.source())
 }
 
 /// Replaces the geometries of bodies. `file` is the file that the scene was read from, for

@@ -216,7 +216,7 @@ impl Joint {
 }
 
 /// `frame` as seen from `body`.
-pub(crate) fn relative(body: Pose, frame: Pose) -> Pose {
+pub fn relative(body: Pose, frame: Pose) -> Pose {
     let inverse = body.rotation.inverse();
     Pose {
         translation: inverse * (frame.translation - body.translation),
@@ -226,7 +226,7 @@ pub(crate) fn relative(body: Pose, frame: Pose) -> Pose {
 
 /// The rotation vector, of at most half a turn, from the frame of `a` to that of `b`, in the world,
 /// rad.
-pub(crate) fn rotation_between(a: Pose, b: Pose) -> DVec3 {
+pub fn rotation_between(a: Pose, b: Pose) -> DVec3 {
     let q = (b.rotation * a.rotation.inverse()).normalize();
     let q = if q.w < 0.0 { -q } else { q };
     // Of small angles the sine keeps all digits.
@@ -247,8 +247,8 @@ pub(crate) fn swing(a: Pose, b: Pose) -> DVec3 {
     }
 }
 
-/// The same angle within ±π.
-pub(crate) fn wrapped(angle: f64) -> f64 {
+/// The same angle within ±π, rad.
+pub fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 

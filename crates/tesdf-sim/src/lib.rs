@@ -14,9 +14,8 @@
 //!   [`newton`] is the built-in engine.
 //! - [`Joint`], [`Motor`]: what connects bodies besides contacts.
 //! - [`script`]: keyframes of kinematic bodies, motors and wrenches.
-//! - [`plan`]: tasks of grippers, which become scripts.
 //! - [`scene_file`]: scenes as TOML files.
-//! - [`criterion`]: what makes a run a success.
+//! - [`criterion`]: what makes a run a success; other crates can add criteria.
 //! - [`Run`]: a run that is made step by step.
 //! - [`record`]: run files.
 //!
@@ -31,7 +30,6 @@ mod forces;
 mod joint;
 mod mass;
 pub mod newton;
-pub mod plan;
 pub mod record;
 pub mod scene_file;
 pub mod script;

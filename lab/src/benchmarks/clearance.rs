@@ -9,8 +9,8 @@ use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
-use super::poses::in_frame_of;
 use crate::reference::Reference;
+use tesdf_sim::criterion::measure::relative;
 
 /// Tolerance of depths, as a fraction of the other solid's diagonal. Distances are exact up to
 /// rounding.
@@ -36,8 +36,8 @@ impl<'a> Body<'a> {
     /// defines it. It is not the length of the shortest translation that separates the solids.
     pub fn clearance(&self, other: &Self, [own, others]: [Pose; 2]) -> f64 {
         let depth =
-            self.deepest(other, in_frame_of(others, own)).max(other.deepest(self, in_frame_of(own, others)));
-        if depth > 0.0 { -depth } else { self.separation(other, in_frame_of(others, own)) }
+            self.deepest(other, relative(others, own)).max(other.deepest(self, relative(own, others)));
+        if depth > 0.0 { -depth } else { self.separation(other, relative(others, own)) }
     }
 
     /// The largest depth of a point of this surface in `other`; 0 when no point is inside. `pose`

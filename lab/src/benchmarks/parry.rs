@@ -10,7 +10,7 @@ use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
 use super::Failure;
-use super::poses::in_frame_of;
+use tesdf_sim::criterion::measure::relative;
 
 /// Name, version and features.
 pub const NAME: &str = if cfg!(feature = "parry-simd8") {
@@ -101,7 +101,7 @@ pub fn point(p: DVec3) -> Vector {
 /// Converts two poses to parry3d's type, with translations multiplied by `scale`. The pose of the
 /// first body in the frame of the second is computed in `f64`.
 pub fn pair(poses: [Pose; 2], scale: f64) -> [ParryPose; 2] {
-    let first = in_frame_of(poses[1], poses[0]);
+    let first = relative(poses[1], poses[0]);
     let rotation: [f32; 4] = first.rotation.as_quat().to_array();
     [
         ParryPose::from_parts(point(first.translation * scale), Rotation::from_array(rotation)),

@@ -26,8 +26,9 @@ use tesdf::{Length, TeSdf};
 use super::clearance::Body;
 use super::input::{Input, Preset};
 use super::parry::{self, Peer};
-use super::poses::{PoseSet, in_frame_of};
+use super::poses::PoseSet;
 use super::{Failure, output};
+use tesdf_sim::criterion::measure::relative;
 
 /// Arguments of `tesdf-lab peers`.
 #[derive(clap::Args)]
@@ -211,8 +212,8 @@ fn vertices(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
     [(Precision::F32, "f32"), (Precision::F64, "f64")]
         .map(|(precision, name)| {
             let poses = measure(set, |[pose_a, pose_b], distance| {
-                let of_a = vertex_contacts(a, b, in_frame_of(pose_b, pose_a), distance, precision);
-                let of_b = vertex_contacts(b, a, in_frame_of(pose_a, pose_b), distance, precision);
+                let of_a = vertex_contacts(a, b, relative(pose_b, pose_a), distance, precision);
+                let of_b = vertex_contacts(b, a, relative(pose_a, pose_b), distance, precision);
                 Ok(Found {
                     contacts: Some(of_a.0 + of_b.0),
                     clearance: Some(of_a.1.min(of_b.1)).filter(|c| c.is_finite()),

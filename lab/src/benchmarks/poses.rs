@@ -8,15 +8,6 @@ use tesdf::glam::{DQuat, DVec3};
 
 use super::Failure;
 
-/// Expresses `pose` in the frame of the body with pose `frame`.
-pub fn in_frame_of(frame: Pose, pose: Pose) -> Pose {
-    let back = frame.rotation.conjugate();
-    Pose {
-        rotation: (back * pose.rotation).normalize(),
-        translation: back * (pose.translation - frame.translation),
-    }
-}
-
 /// A file of `lab/poses`.
 pub struct PoseSet {
     /// File name without extension.

@@ -15,6 +15,7 @@ use tesdf::{Progress, TeSdf};
 use tesdf_sim::scene_file::{LoadedScene, MAX_BODIES};
 
 use super::poses::{PoseFile, VERSION};
+use crate::scenes::criteria;
 use tesdf_cli::terminal::progress::{interrupt_flag, watched};
 use tesdf_cli::terminal::report::Failure;
 use tesdf_cli::terminal::{asset_file, run_file};
@@ -48,7 +49,9 @@ impl Frames {
         options: &EncodeOptions,
     ) -> Result<Self, Failure> {
         let frames = match path.extension().and_then(|e| e.to_str()) {
-            Some("toml") => Self::of_scene(&LoadedScene::read(path).map_err(Failure::new)?)?,
+            Some("toml") => {
+                Self::of_scene(&LoadedScene::read_with(path, &criteria()).map_err(Failure::new)?)?
+            }
             Some("json") => Self::of_poses(path, max_frames, options)?,
             _ => Self::of_run(path, max_frames)?,
         };
@@ -99,7 +102,7 @@ impl Frames {
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(scene) = &file.scene {
-            let mut loaded = LoadedScene::read(folder.join(scene)).map_err(Failure::new)?;
+            let mut loaded = LoadedScene::read_with(folder.join(scene), &criteria()).map_err(Failure::new)?;
             let _assets = encode_meshes(&mut loaded, options)?;
             let start = Self::of_scene(&loaded)?;
             let poses = file.poses(start.poses[0].len(), max_frames).map_err(|e| named(&e))?;

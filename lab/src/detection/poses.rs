@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::save::Destination;
 
 use tesdf_cli::terminal::output::{self, Consent};
 use tesdf_cli::terminal::parse;
@@ -52,15 +53,9 @@ pub struct Args {
     /// The scene
     #[arg(value_enum)]
     pub scene: Scene,
-    /// Output file, JSON; an existing file is replaced, a pipe or device is written to
-    #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
-    /// Whether a read-only output is replaced.
+    /// Where the poses go.
     #[command(flatten)]
-    pub consent: Consent,
-    /// Number of frames
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub frames: u32,
+    pub file: FileArgs,
     /// Seed of the random poses
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,
@@ -72,6 +67,41 @@ pub struct Args {
     pub data: PathBuf,
 }
 
+/// A file of poses that is written.
+#[derive(clap::Args, Debug)]
+pub struct FileArgs {
+    /// Output file, JSON; an existing file is replaced, a pipe or device is written to
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
+    /// Number of frames; those of a run are evenly spaced from its beginning to its end
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+}
+
+impl FileArgs {
+    /// Opens the output, which is none of the `inputs`.
+    ///
+    /// # Errors
+    /// It cannot be written, or is an input.
+    pub fn open(&self, inputs: &[PathBuf]) -> Result<Destination, Failure> {
+        output::open(&self.output, inputs, self.consent)
+    }
+
+    /// Writes the poses, and prints how many they are.
+    ///
+    /// # Errors
+    /// The output or stdout cannot be written.
+    pub fn write(&self, destination: &Destination, file: &PoseFile) -> Result<(), Failure> {
+        output::write(destination, &serde_json::to_vec(file).map_err(Failure::new)?)?;
+        let instances = count(file.frames.first().map_or(0, Vec::len), "instance");
+        let frames = count(file.frames.len(), "frame");
+        report::text(&format!("{}: {instances}, {frames}\n", self.output.display()))
+    }
+}
+
 /// Writes a file of poses.
 ///
 /// # Errors
@@ -79,19 +109,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let data =
         std::path::absolute(&args.data).map_err(|e| Failure::new(format!("{}: {e}", args.data.display())))?;
-    let mut file = args.scene.poses(&data, args.frames as usize, &mut fastrand::Rng::with_seed(args.seed));
+    let mut file =
+        args.scene.poses(&data, args.file.frames as usize, &mut fastrand::Rng::with_seed(args.seed));
     file.contact_distance = args.contact_distance.unwrap_or(file.contact_distance);
-    let output = output::open(&args.output, &file.bodies, args.consent)?;
-    let bytes = serde_json::to_vec(&file).map_err(Failure::new)?;
-    output::write(&output, &bytes)?;
-    let line = format!(
-        "{}: {}, {}\n",
-        args.output.display(),
-        count(file.instances.len(), "instance"),
-        count(file.frames.len(), "frame")
-    );
-    report::text(&line)?;
-    Ok(())
+    args.file.write(&args.file.open(&file.bodies)?, &file)
 }
 
 impl Scene {

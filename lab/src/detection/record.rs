@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 
 use tesdf_sim::scene_file::LoadedScene;
 
-use super::poses::{PoseFile, VERSION, pose};
-use tesdf_cli::terminal::output::{self, Consent};
-use tesdf_cli::terminal::report::{self, Failure, count};
+use super::poses::{FileArgs, PoseFile, VERSION, pose};
+use crate::scenes::criteria;
+use tesdf_cli::terminal::report::Failure;
 use tesdf_cli::terminal::run_file;
 
 /// Arguments of `tesdf-lab record`.
@@ -16,15 +16,9 @@ pub struct Args {
     /// The scene file of the run
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Output file, JSON; an existing file is replaced, a pipe or device is written to
-    #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
-    /// Whether a read-only output is replaced.
+    /// Where the poses go.
     #[command(flatten)]
-    pub consent: Consent,
-    /// Number of frames, evenly spaced from the beginning to the end of the run
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub frames: u32,
+    pub file: FileArgs,
 }
 
 /// Writes a file of poses with the bodies of a scene.
@@ -32,9 +26,9 @@ pub struct Args {
 /// # Errors
 /// A file cannot be read, or the bodies of the scene are not those of the run.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let output = output::open(&args.output, &[args.run.clone(), args.scene.clone()], args.consent)?;
+    let output = args.file.open(&[args.run.clone(), args.scene.clone()])?;
     let record = run_file::open(&args.run)?;
-    let loaded = LoadedScene::read(&args.scene).map_err(Failure::new)?;
+    let loaded = LoadedScene::read_with(&args.scene, &criteria()).map_err(Failure::new)?;
     let names = loaded.scene.bodies.iter().map(|body| body.get_ref().name.as_str());
     if !names.eq(record.bodies.iter().map(String::as_str)) {
         let (scene, run) = (args.scene.display(), args.run.display());
@@ -42,7 +36,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .hint("give the scene file that the run was made with"));
     }
     let last = record.steps();
-    let frames = u64::from(args.frames).min(last + 1);
+    let frames = u64::from(args.file.frames).min(last + 1);
     let step = |frame: u64| (frame * last / (frames - 1).max(1)) as usize;
     let poses_of = |step| {
         let poses = (0..record.bodies.len()).map(|body| record.pose(step, body));
@@ -53,16 +47,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let file = PoseFile {
         tesdf_poses: VERSION,
         contact_distance: loaded.scene.detector.contact_distance.unwrap_or(0.0),
-        scene: Some(relative(&args.scene, &args.output)?),
+        scene: Some(relative(&args.scene, &args.file.output)?),
         bodies: Vec::new(),
         instances: Vec::new(),
         frames,
     };
-    output::write(&output, &serde_json::to_vec(&file).map_err(Failure::new)?)?;
-    let instances = count(record.bodies.len(), "instance");
-    let frames = count(file.frames.len(), "frame");
-    report::text(&format!("{}: {instances}, {frames}\n", args.output.display()))?;
-    Ok(())
+    args.file.write(&output, &file)
 }
 
 /// The path of a file, from the folder of another file.

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 use tesdf::collide::InstanceId;
 
-use super::shared::{Checks, Hinge, Penetration, clearance_row, positive};
+use super::measure::{Checks, Hinge, Penetration, clearance_row, positive};
 use super::{Criterion, Report, Rows, Tracker};
 use crate::{Drive, Mass, Motor, System};
 

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, body, clearance_row, free_body, positive, unit};
+use super::measure::{Checks, Penetration, body, clearance_row, free_body, positive, unit};
 use super::{Criterion, Report, Rows, Tracker};
 use crate::joint::{relative, rotation_between};
 use crate::{Mass, MassProperties, State, System};

@@ -1,39 +1,121 @@
-//! Success criteria of a run. Each has a module of its own and a line in `criteria!`.
-mod assembly;
+//! Success criteria of a run.
+//!
+//! The criteria of this crate are those of [`Criteria::standard`]. A criterion of another crate is a
+//! type that implements [`Criterion`]; its [`Tracker`] sees the system after each step, and its
+//! [`Report`] is a field of the [`Summary`](crate::Summary). [`measure`] has what criteria look up
+//! and measure. Scene files are read with the criteria that they may have:
+//!
+//! ```
+//! use serde::{Deserialize, Serialize};
+//! use tesdf_sim::System;
+//! use tesdf_sim::criterion::{Criteria, Criterion, Report, Rows, Tracker, measure};
+//! use tesdf_sim::scene_file::LoadedScene;
+//!
+//! /// A body ends above a height: `[criterion.above]`.
+//! #[derive(Clone, Debug, Serialize, Deserialize)]
+//! #[serde(deny_unknown_fields)]
+//! struct Above {
+//!     body: String,
+//!     height: f64,
+//! }
+//!
+//! impl Criterion for Above {
+//!     const NAME: &str = "above";
+//!     type Tracker = Height;
+//!
+//!     fn check(&self, system: &System) -> Result<Vec<String>, String> {
+//!         measure::positive([("height", self.height)])?;
+//!         measure::free_body(system, &self.body, "lift")?;
+//!         Ok(vec![self.body.clone()])
+//!     }
+//!
+//!     fn track(&self, system: &System) -> Result<Height, String> {
+//!         Ok(Height { body: measure::body(system, &self.body)?, least: self.height })
+//!     }
+//! }
+//!
+//! #[derive(Clone, Debug)]
+//! struct Height {
+//!     body: usize,
+//!     least: f64,
+//! }
+//!
+//! impl Tracker for Height {
+//!     type Report = HeightReport;
+//!
+//!     fn observe(&mut self, _: &System, _: f64) {}
+//!
+//!     fn report(&self, system: &System) -> HeightReport {
+//!         let height = system.states()[self.body].pose.translation.z;
+//!         let failure = format!("height: {height} m; expected at least {} m", self.least);
+//!         let failures = if height >= self.least { Vec::new() } else { vec![failure] };
+//!         HeightReport { height, failures }
+//!     }
+//! }
+//!
+//! #[derive(Clone, Debug, Serialize)]
+//! struct HeightReport {
+//!     height: f64,
+//!     failures: Vec<String>,
+//! }
+//!
+//! impl Report for HeightReport {
+//!     fn failures(&mut self) -> &mut Vec<String> {
+//!         &mut self.failures
+//!     }
+//!
+//!     fn rows(&self) -> Rows {
+//!         vec![("height", format!("{:.3} m", self.height))]
+//!     }
+//! }
+//!
+//! let text = r#"
+//!     time_step = 0.01
+//!     duration = 0.1
+//!     [criterion.above]
+//!     body = "ball"
+//!     height = 0.5
+//!     [[bodies]]
+//!     name = "ball"
+//!     shape = { sphere = { radius = 0.1 } }
+//!     mass = 1
+//!     translation = [0, 0, 1]
+//! "#;
+//! let criteria = Criteria::standard().with::<Above>();
+//! let loaded = LoadedScene::parse_with(text.into(), "scene.toml", &criteria)?;
+//! let mut engine = loaded.newton(loaded.system()?)?;
+//! let watch = |_: &tesdf_sim::Moment| std::ops::ControlFlow::Continue(());
+//! let (_, summary) = tesdf_sim::simulate(&loaded.scene, &mut engine, watch)?;
+//! assert_eq!(summary.passed, Some(true));
+//! assert!(summary.report::<HeightReport>().unwrap().height < 1.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+mod criteria;
 mod gear_ratio;
-mod hoist;
 mod insertion;
 mod lift;
-mod linking;
+pub mod measure;
 mod rest;
 mod screw;
 mod section;
 mod separation;
-mod shared;
-mod transmission;
 
-pub use assembly::{AssemblyCriterion, AssemblyReport, AssemblyTracker, NutGroup, PartReport, PegGroup};
+pub use criteria::Criteria;
 pub use gear_ratio::{GearRatioCriterion, GearRatioReport, GearRatioTracker};
-pub use hoist::{HoistChain, HoistCriterion, HoistLink, HoistReport, HoistTracker};
 pub use insertion::{InsertionCriterion, InsertionReport, InsertionTracker};
 pub use lift::{LiftCriterion, LiftReport, LiftTracker};
 pub use rest::{RestCriterion, RestReport, RestTracker};
 pub use screw::{ScrewCriterion, ScrewReport, ScrewTracker, screw_acceleration};
-pub use separation::{SeparationCriterion, SeparationReport, SeparationTracker};
-pub use transmission::{
-    EngagedGear, EngagedReport, TransmissionCriterion, TransmissionReport, TransmissionTracker,
-};
-
-use std::fmt;
-use std::sync::Arc;
-
-use serde::Serialize;
-use serde::de::{DeserializeOwned, MapAccess};
-
-use crate::System;
-use section::Named;
 pub use section::{CriterionReport, CriterionSection};
 pub(crate) use section::{Trackers, by_name};
+pub use separation::{SeparationCriterion, SeparationReport, SeparationTracker};
+
+use std::fmt;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::System;
 
 /// How far joints came apart, at any step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -88,31 +170,3 @@ pub trait Report: Clone + fmt::Debug + Serialize + Send + Sync + 'static {
     /// The measured values.
     fn rows(&self) -> Rows;
 }
-
-macro_rules! criteria {
-    ($($criterion:ident),* $(,)?) => {
-        /// The names of all criteria.
-        const NAMES: &[&str] = &[$($criterion::NAME),*];
-
-        /// Reads the table of the criterion `name`, if there is such a criterion.
-        fn read<'de, A: MapAccess<'de>>(name: &str, tables: &mut A) -> Result<Option<Named>, A::Error> {
-            $(if name == $criterion::NAME {
-                let criterion: $criterion = tables.next_value()?;
-                return Ok(Some(($criterion::NAME, Arc::new(criterion))));
-            })*
-            Ok(None)
-        }
-    };
-}
-
-criteria!(
-    AssemblyCriterion,
-    GearRatioCriterion,
-    HoistCriterion,
-    InsertionCriterion,
-    LiftCriterion,
-    RestCriterion,
-    ScrewCriterion,
-    SeparationCriterion,
-    TransmissionCriterion,
-);

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::Pose;
 use tesdf::glam::DVec3;
 
-use super::shared::{free_body, positive, unit};
+use super::measure::{free_body, positive, unit};
 use super::{Criterion, Report, Rows, Tracker};
 use crate::{MassProperties, System};
 

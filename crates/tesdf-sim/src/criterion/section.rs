@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use serde::de::{Error, MapAccess, Visitor};
+use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
-use super::{Criterion, NAMES, Report, Rows, Tracker, read};
+use super::{Criteria, Criterion, Report, Rows, Tracker};
 use crate::System;
 
 /// The success criteria of a run, by the names of their tables. Every criterion that is given must
@@ -32,30 +32,11 @@ impl Serialize for CriterionSection {
 }
 
 impl<'de> Deserialize<'de> for CriterionSection {
+    /// Reads criteria of this crate. [`LoadedScene`](crate::scene_file::LoadedScene) reads those of
+    /// other crates, too.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(Tables)
-    }
-}
-
-/// Reads the tables of a section.
-struct Tables;
-
-impl<'de> Visitor<'de> for Tables {
-    type Value = CriterionSection;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("tables of criteria")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut tables: A) -> Result<CriterionSection, A::Error> {
-        let mut section = CriterionSection::default();
-        while let Some(name) = tables.next_key::<String>()? {
-            match read(&name, &mut tables)? {
-                Some((name, criterion)) => section.0.insert(name, criterion),
-                None => return Err(A::Error::unknown_field(&name, NAMES)),
-            };
-        }
-        Ok(section)
+        let tables = BTreeMap::<String, Value>::deserialize(deserializer)?;
+        Self::of_json(tables, &Criteria::standard()).map_err(D::Error::custom)
     }
 }
 
@@ -67,7 +48,7 @@ impl CriterionSection {
 
     /// Gives the scene the criterion `C`, in place of the one that it may have.
     pub fn set<C: Criterion>(&mut self, criterion: C) {
-        self.0.insert(C::NAME, Arc::new(criterion));
+        self.insert(C::NAME, Arc::new(criterion));
     }
 
     /// Changes the criterion `C`; `None` when the scene does not have it.
@@ -81,6 +62,27 @@ impl CriterionSection {
     /// Takes the criterion `C` out of the scene, if it has it.
     pub fn remove<C: Criterion>(&mut self) {
         self.0.remove(C::NAME);
+    }
+
+    /// Reads the tables of `criteria`.
+    ///
+    /// # Errors
+    /// A message that names the criterion.
+    pub(crate) fn of_json(
+        tables: impl IntoIterator<Item = (String, Value)>,
+        criteria: &Criteria,
+    ) -> Result<Self, String> {
+        let read = |(name, table): (String, Value)| {
+            let reader = criteria.reader(&name)?;
+            let criterion = (reader.json)(table).map_err(|e| format!("{name}: {e}"))?;
+            Ok((reader.name, criterion))
+        };
+        tables.into_iter().map(read).collect::<Result<_, String>>().map(Self)
+    }
+
+    /// Adds a criterion that was read.
+    pub(crate) fn insert(&mut self, name: &'static str, criterion: Arc<dyn Known>) {
+        self.0.insert(name, criterion);
     }
 
     /// Checks that the criteria match the bodies and joints. `free` says why a body is driven by
@@ -100,11 +102,8 @@ impl CriterionSection {
     }
 }
 
-/// A criterion and its name.
-pub(super) type Named = (&'static str, Arc<dyn Known>);
-
 /// A [`Criterion`] of any kind.
-pub(super) trait Known: fmt::Debug + Send + Sync {
+pub(crate) trait Known: fmt::Debug + Send + Sync {
     fn check(&self, system: &System) -> Result<Vec<String>, String>;
     fn follow(&self, system: &System) -> Result<Box<dyn Followed>, String>;
     fn value(&self) -> Value;
@@ -131,7 +130,7 @@ impl<C: Criterion> Known for C {
 }
 
 /// A [`Tracker`] of any kind.
-pub(super) trait Followed: fmt::Debug + Send + Sync {
+pub(crate) trait Followed: fmt::Debug + Send + Sync {
     fn observe(&mut self, system: &System, time_step: f64);
     fn report(&self, name: &'static str, system: &System, failures: &[String]) -> CriterionReport;
     fn copy(&self) -> Box<dyn Followed>;
@@ -220,10 +219,12 @@ impl PartialEq for CriterionReport {
     }
 }
 
-/// Writes reports as fields with the names of their criteria.
+/// Writes reports as fields with the names of their criteria. Criteria of this crate that the scene
+/// does not have are null.
 pub(crate) fn by_name<S: Serializer>(reports: &[CriterionReport], serializer: S) -> Result<S::Ok, S::Error> {
     let of_scene = reports.iter().map(|report| (report.name, Some(&report.values)));
     let is_there = |name: &str| reports.iter().any(|report| report.name == name);
-    let others = NAMES.iter().copied().filter(|name| !is_there(name)).map(|name| (name, None));
+    let standard = Criteria::standard();
+    let others = standard.names().filter(|name| !is_there(name)).map(|name| (name, None));
     serializer.collect_map(of_scene.chain(others))
 }

@@ -1,7 +1,7 @@
 //! Bodies that begin deep in each other come apart.
 use serde::{Deserialize, Serialize};
 
-use super::shared::{Penetration, positive};
+use super::measure::{Penetration, positive};
 use super::{Criterion, Report, Rows, Tracker};
 use crate::{Mass, System};
 

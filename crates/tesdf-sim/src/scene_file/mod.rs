@@ -74,7 +74,6 @@ pub use read::LoadedScene;
 
 use crate::criterion::CriterionSection;
 use crate::newton::NewtonOptions;
-use crate::plan::PlanSection;
 use crate::script::Script;
 use crate::{JointKind, JointResistance, Motor};
 
@@ -115,9 +114,6 @@ pub struct SceneFile {
     /// What drives kinematic bodies, motors and wrenches in time.
     #[serde(default)]
     pub scripts: Vec<Script>,
-    /// Tasks of grippers. A loaded scene has scripts in their place.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plan: Option<PlanSection>,
 }
 
 /// Friction between two bodies.

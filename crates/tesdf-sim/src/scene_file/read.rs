@@ -1,14 +1,14 @@
 use std::path::{Path, PathBuf};
 
-use tesdf::collide::Pose;
-use tesdf::glam::{DQuat, DVec3};
+use serde::Deserialize;
+use serde_json::Value;
 use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::copies::expand;
 use super::{BodySection, MAX_BODIES, SceneError, SceneFile};
 use crate::RunRecord;
-use crate::plan::scripts;
+use crate::criterion::{Criteria, CriterionSection};
 
 /// Maximum size of a scene file: a thousand bytes per body.
 const MAX_TEXT: usize = 1000 * MAX_BODIES;
@@ -28,56 +28,63 @@ impl LoadedScene {
     /// Reads a scene file.
     ///
     /// # Errors
-    /// [`SceneError::Read`] or [`SceneError::Parse`].
+    /// [`SceneError::Read`], [`SceneError::Parse`], or [`SceneError::Value`] for an unknown criterion.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        Self::read_with(path, &Criteria::standard())
+    }
+
+    /// As [`read`](Self::read), with `criteria` in place of [`Criteria::standard`].
+    ///
+    /// # Errors
+    /// The same errors as [`read`](Self::read).
+    pub fn read_with(path: impl AsRef<Path>, criteria: &Criteria) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let text = tesdf::input::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.to_path_buf(), source })?;
-        Self::parse(text, path)
+        Self::parse_with(text, path, criteria)
     }
 
     /// As [`read`](Self::read), but from `text`. Paths in it are relative to the folder of `path`.
     ///
     /// # Errors
-    /// [`SceneError::Parse`].
+    /// The same errors as [`read`](Self::read).
     pub fn parse(text: String, path: impl AsRef<Path>) -> Result<Self, SceneError> {
-        Self::parse_at(text, path.as_ref())
+        Self::parse_with(text, path, &Criteria::standard())
     }
 
-    fn parse_at(text: String, path: &Path) -> Result<Self, SceneError> {
+    /// As [`parse`](Self::parse), with `criteria` in place of [`Criteria::standard`].
+    ///
+    /// # Errors
+    /// The same errors as [`read`](Self::read).
+    pub fn parse_with(text: String, path: impl AsRef<Path>, criteria: &Criteria) -> Result<Self, SceneError> {
+        let path = path.as_ref().to_path_buf();
         if text.len() > MAX_TEXT {
             let message = format!("{} bytes; expected a scene of at most {MAX_TEXT}", text.len());
-            return Err(SceneError::Parse { path: path.to_path_buf(), message });
+            return Err(SceneError::Parse { path, message });
         }
-        let scene = toml::from_str(&text).map_err(|e| SceneError::Parse {
-            path: path.to_path_buf(),
-            message: e.to_string().trim_end().to_string(),
-        })?;
-        Self { scene, path: path.to_path_buf(), text }.expanded()
+        let refuse = |mut e: toml::de::Error| {
+            e.set_input(Some(&text));
+            SceneError::Parse { path: path.clone(), message: e.to_string().trim_end().to_string() }
+        };
+        let mut document = DeTable::parse(&text).map_err(refuse)?;
+        let tables = match document.get_mut().get_mut("criterion").map(Spanned::get_mut) {
+            Some(DeValue::Table(tables)) => std::mem::take(tables),
+            _ => DeTable::default(),
+        };
+        let mut scene = SceneFile::deserialize(Deserializer::from(document)).map_err(refuse)?;
+        for (name, table) in tables {
+            let reader = criteria.reader(name.get_ref()).map_err(|reason| SceneError::Value {
+                path: path.clone(),
+                line: Some(line(&text, name.span().start)),
+                key: "criterion".into(),
+                reason,
+            })?;
+            scene.criterion.insert(reader.name, (reader.toml)(table.into()).map_err(refuse)?);
+        }
+        Self { scene, path, text }.with_copies()
     }
 
-    /// The scene with each copy of a body as a body of its own, and scripts in place of a plan.
-    fn expanded(self) -> Result<Self, SceneError> {
-        self.with_copies()?.with_scripts()
-    }
-
-    fn with_scripts(mut self) -> Result<Self, SceneError> {
-        let Some(plan) = self.scene.plan.take() else { return Ok(self) };
-        let scripts = scripts(&plan, self.scene.duration, |name| self.start(name))
-            .map_err(|e| self.value("plan", e))?;
-        self.scene.scripts.extend(scripts);
-        Ok(self)
-    }
-
-    /// Where a body starts.
-    fn start(&self, name: &str) -> Result<Pose, String> {
-        let mut bodies = self.scene.bodies.iter().map(Spanned::get_ref);
-        let body = bodies.find(|body| body.name == name);
-        let body = body.ok_or_else(|| format!("there is no body {name}; give the name of a body"))?;
-        let (translation, rotation) = (DVec3::from_array(body.translation), DQuat::from_array(body.rotation));
-        Pose::new(translation, rotation).map_err(|e| format!("body {name}: {e}"))
-    }
-
+    /// The scene with each copy of a body as a body of its own.
     fn with_copies(mut self) -> Result<Self, SceneError> {
         match expand(std::mem::take(&mut self.scene.bodies)) {
             Ok(bodies) => Ok(Self { scene: SceneFile { bodies, ..self.scene }, ..self }),
@@ -85,19 +92,31 @@ impl LoadedScene {
         }
     }
 
-    /// The scene that is stored in a run, where `run` is the path of the run file. Errors
-    /// name no line, because the run does not keep the text of the scene file.
+    /// The scene that is stored in a run, without its criteria, where `run` is the path of the run
+    /// file. Errors name no line, because the run does not keep the text of the scene file.
     ///
     /// # Errors
     /// [`SceneError::Parse`] when the run holds no scene.
     pub fn of_run(record: &RunRecord, run: impl AsRef<Path>) -> Result<Self, SceneError> {
-        Self::of_record(record, run.as_ref())
+        Self::of_record(record, run.as_ref(), None)
     }
 
-    fn of_record(record: &RunRecord, run: &Path) -> Result<Self, SceneError> {
+    /// As [`of_run`](Self::of_run), with the criteria, to go on with the run.
+    ///
+    /// # Errors
+    /// The same errors as [`of_run`](Self::of_run), and an unknown criterion.
+    pub fn of_run_with(
+        record: &RunRecord,
+        run: impl AsRef<Path>,
+        criteria: &Criteria,
+    ) -> Result<Self, SceneError> {
+        Self::of_record(record, run.as_ref(), Some(criteria))
+    }
+
+    fn of_record(record: &RunRecord, run: &Path, criteria: Option<&Criteria>) -> Result<Self, SceneError> {
         let path =
             run.file_name().map_or_else(|| run.to_path_buf(), |name| Path::new(&record.folder).join(name));
-        Self::parse_json(record.scene.clone(), path).map_err(|e| match e {
+        Self::parse_json(record.scene.clone(), path, criteria).map_err(|e| match e {
             SceneError::Parse { message, .. } => {
                 SceneError::Parse { path: run.to_path_buf(), message: format!("the scene in it: {message}") }
             }
@@ -110,28 +129,39 @@ impl LoadedScene {
     ///
     /// # Errors
     /// [`SceneError::Parse`] when a key or a value is not that of a scene file.
-    pub fn of_json(scene: serde_json::Value, path: impl AsRef<Path>) -> Result<Self, SceneError> {
-        Self::parse_json(scene, path.as_ref().to_path_buf())
+    pub fn of_json(scene: Value, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        Self::parse_json(scene, path.as_ref().to_path_buf(), Some(&Criteria::standard()))
     }
 
-    fn parse_json(mut json: serde_json::Value, path: PathBuf) -> Result<Self, SceneError> {
+    /// Without `criteria`, those of the scene are left out.
+    fn parse_json(mut json: Value, path: PathBuf, criteria: Option<&Criteria>) -> Result<Self, SceneError> {
         let refuse = |message: String| SceneError::Parse { path: path.clone(), message };
+        let tables = match json.get_mut("criterion") {
+            Some(Value::Object(tables)) => std::mem::take(tables),
+            _ => serde_json::Map::new(),
+        };
+        let criterion = criteria.map_or_else(
+            || Ok(CriterionSection::default()),
+            |criteria| {
+                CriterionSection::of_json(tables, criteria).map_err(|e| refuse(format!("criterion: {e}")))
+            },
+        )?;
         // `Spanned` can only be read from TOML.
-        let bodies = match json.get_mut("bodies").map(serde_json::Value::take) {
-            Some(serde_json::Value::Array(bodies)) => bodies,
+        let bodies = match json.get_mut("bodies").map(Value::take) {
+            Some(Value::Array(bodies)) => bodies,
             found => {
                 return Err(refuse(format!("bodies: {}; expected a list of bodies", kind(found.as_ref()))));
             }
         };
-        let read = |(k, body): (usize, serde_json::Value)| {
+        let read = |(k, body): (usize, Value)| {
             let body: BodySection =
                 serde_json::from_value(body).map_err(|e| refuse(format!("bodies: entry {k}: {e}")))?;
             Ok(Spanned::new(0..0, body))
         };
         let bodies = bodies.into_iter().enumerate().map(read).collect::<Result<_, SceneError>>()?;
-        json["bodies"] = serde_json::Value::Array(Vec::new());
+        json["bodies"] = Value::Array(Vec::new());
         let scene: SceneFile = serde_json::from_value(json).map_err(|e| refuse(e.to_string()))?;
-        Self { scene: SceneFile { bodies, ..scene }, path, text: String::new() }.expanded()
+        Self { scene: SceneFile { bodies, criterion, ..scene }, path, text: String::new() }.with_copies()
     }
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
@@ -175,7 +205,7 @@ impl LoadedScene {
 
     /// Line number, from 1, of a byte of the text.
     pub(super) fn line(&self, byte: usize) -> usize {
-        1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count()
+        line(&self.text, byte)
     }
 
     /// An error of a body of the scene.
@@ -213,15 +243,20 @@ impl LoadedScene {
     }
 }
 
+/// Line number, from 1, of a byte of a text.
+fn line(text: &str, byte: usize) -> usize {
+    1 + text.bytes().take(byte).filter(|&b| b == b'\n').count()
+}
+
 /// What a value is, for messages.
-fn kind(value: Option<&serde_json::Value>) -> &'static str {
+fn kind(value: Option<&Value>) -> &'static str {
     match value {
         None => "missing",
-        Some(serde_json::Value::Null) => "null",
-        Some(serde_json::Value::Bool(_)) => "true or false",
-        Some(serde_json::Value::Number(_)) => "a number",
-        Some(serde_json::Value::String(_)) => "a string",
-        Some(serde_json::Value::Array(_)) => "a list",
-        Some(serde_json::Value::Object(_)) => "an object",
+        Some(Value::Null) => "null",
+        Some(Value::Bool(_)) => "true or false",
+        Some(Value::Number(_)) => "a number",
+        Some(Value::String(_)) => "a string",
+        Some(Value::Array(_)) => "a list",
+        Some(Value::Object(_)) => "an object",
     }
 }

@@ -1,12 +1,10 @@
 //! The tests of `tesdf-sim` over several of its modules, in one program.
 mod analytic;
-mod assembly;
 mod chain;
 mod deep;
 mod forces;
 mod friction;
 mod gear_ratio;
-mod hoist;
 mod insertion;
 mod joints;
 mod journal;
@@ -24,5 +22,4 @@ mod scripts;
 mod separation;
 mod sleep;
 mod support;
-mod transmission;
 mod warnings;

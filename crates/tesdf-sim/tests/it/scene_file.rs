@@ -158,6 +158,22 @@ fn errors_name_the_line_and_the_body() {
             DROP.to_string() + "[criterion.rest]\nmax_drift = -1\nmax_energy_gain = 0",
             vec!["line 18", "criterion.rest", "max_drift is -1", "0 or greater"],
         ),
+        (
+            DROP.to_string() + "[criterion.rest]\nmax_drift = \"low\"\nmax_energy_gain = 0",
+            vec!["line 19", "max_drift = \"low\"", "expected f64"],
+        ),
+        (
+            DROP.to_string() + "[criterion.rest]\nmax_drift = 1",
+            vec!["line 18", "missing field `max_energy_gain`"],
+        ),
+        (
+            DROP.to_string() + "[criterion.stay]\nmax_drift = 1",
+            vec![
+                "line 18",
+                "criterion: there is no criterion stay; expected one of gear_ratio, insertion, lift",
+            ],
+        ),
+        (DROP.replacen("duration", "criterion = 3\nduration", 1), vec!["line 3", "expected a map"]),
     ];
     for (k, (text, expected)) in cases.into_iter().enumerate() {
         let text = if k >= 22 { refusal(&text) } else { text };

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::Value;
+use tesdf_sim::criterion::Criteria;
 use tesdf_sim::scene_file::{LoadedScene, SceneFile};
 
 use crate::support::run;
@@ -82,7 +83,10 @@ impl Place {
 
     fn read(&self, value: &str) -> Result<SceneFile, String> {
         let document = toml::from_str(&format!("{}{value}{}", self.before, self.after));
-        document.map(|document: Document| document.scene).map_err(|e| e.message().to_string())
+        document.map(|document: Document| document.scene).map_err(|e| {
+            let of_criterion = |name| e.message().strip_prefix(name)?.strip_prefix(": ");
+            Criteria::standard().names().find_map(of_criterion).unwrap_or(e.message()).to_string()
+        })
     }
 
     fn kind(&self) -> Kind {
@@ -90,6 +94,9 @@ impl Place {
         let names = || code_spans(&message).skip(1).map(String::from).collect();
         if message.starts_with("unknown field `?`") {
             return Kind::Table(names());
+        }
+        if let Some(names) = message.strip_prefix("there is no criterion ?; expected one of ") {
+            return Kind::Table(names.split(", ").map(String::from).collect());
         }
         if message.starts_with("unknown variant `?`") {
             return Kind::Choice(names());

@@ -1,15 +1,16 @@
 //! Chains on spools hoist a platform.
-
 use tesdf::mesh::write;
+use tesdf_lab::scenes::HoistReport;
 use tesdf_parts::{Resolution, Spool};
-use tesdf_sim::criterion::HoistReport;
-use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{RunRecord, Summary};
+
+use crate::support::{self, balls, parse, text_of};
 
 /// A scene of the repository with ten links a chain, that turns its spools by 0.4 rad. `platform` is
 /// where its platform is, m, with 100 links and with ten.
 fn short(scene: &str, platform: [&str; 2]) -> String {
-    let mut text = std::fs::read_to_string(crate::support::path_of(scene)).unwrap();
+    let mut text = text_of(scene);
     let [from, to] = platform.map(|z| format!("translation = [0, 0, {z}]"));
     for (from, to) in [
         ("count = 100", "count = 10"),
@@ -33,21 +34,10 @@ fn text() -> String {
     short("chained-sam", ["-2.90001", "-0.29091"])
 }
 
-fn load(text: String) -> Result<LoadedScene, SceneError> {
-    LoadedScene::parse(text, crate::support::path_of("chained-sam"))
-}
-
 fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
-    let mut loaded = load(text()).unwrap();
+    let mut loaded = parse(text(), "chained-sam").unwrap();
     change(&mut loaded);
-    run_loaded(&loaded)
-}
-
-fn run_loaded(loaded: &LoadedScene) -> (RunRecord, Summary) {
-    let system = loaded.system().unwrap();
-    let (record, mut summary) = crate::support::run(loaded, system);
-    (summary.detection_ms, summary.solution_ms) = (0.0, 0.0);
-    (record, summary)
+    support::run(&loaded)
 }
 
 fn failures(summary: &Summary) -> String {
@@ -74,9 +64,9 @@ fn the_platform_rises_the_same_on_any_number_of_threads() {
 
 #[test]
 fn with_a_skin_vertices_hoist_it() {
-    let loaded = load(short("chained-sam-nodes", ["-2.891397", "-0.290127"])).unwrap();
+    let loaded = parse(short("chained-sam-nodes", ["-2.891397", "-0.290127"]), "chained-sam-nodes").unwrap();
     assert_eq!(loaded.scene.detector.name(), DetectorMode::Node);
-    let (_, summary) = run_loaded(&loaded);
+    let (_, summary) = support::run(&loaded);
     assert_eq!(summary.passed, Some(true), "{summary:?}");
 }
 
@@ -85,7 +75,7 @@ fn with_a_skin_vertices_hoist_it() {
 #[test]
 fn both_scenes_are_one_but_for_a_few_values() {
     let [faces, nodes] = ["chained-sam", "chained-sam-nodes"].map(|name| {
-        let text = std::fs::read_to_string(crate::support::path_of(name)).unwrap();
+        let text = text_of(name);
         let is_of_scene = |line: &&str| !line.starts_with('#') && !line.starts_with("angular_damping");
         text.lines().filter(is_of_scene).map(|line| format!("{line}\n")).collect::<String>()
     });
@@ -127,11 +117,7 @@ fn a_drum_that_is_too_thick_breaks_the_chains() {
 
 #[test]
 fn what_is_no_hoist_is_refused() {
-    // The shapes are of no account.
-    let shape = "shape = { sphere = { radius = 0.001 } }";
-    let text = text()
-        .replace("mesh = \"../data/parts/chain_link.ply\"", shape)
-        .replace("mesh = \"../data/parts/chain_spool.ply\"", shape);
+    let text = balls(&text());
     let weld = "[[joints]]\nname = \"held\"\nkind = \"weld\"\nchild = \"platform\"\n\n[criterion.hoist]";
     let link =
         "[[joints]]\nname = \"held\"\nkind = \"ball\"\nparent = \"a3\"\nchild = \"a4\"\n\n[criterion.hoist]";
@@ -152,5 +138,5 @@ fn what_is_no_hoist_is_refused() {
         ("pitch = 0.029", "pitch = -1", "link.pitch is -1; expected a positive number"),
         ("pitch = 0.029", "pitch = 0.035", "link.pitch is 0.035; expected more than half"),
     ];
-    crate::support::refused(&text, &crate::support::path_of("chained-sam"), &cases);
+    support::refused(&text, "chained-sam", &cases);
 }

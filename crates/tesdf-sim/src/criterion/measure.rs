@@ -1,4 +1,6 @@
-//! What several criteria look up and measure.
+//! What criteria look up and measure.
+//!
+//! Errors are messages for people: they name what was found and what was expected.
 use tesdf::Length;
 use tesdf::collide::{
     ClearanceOptions, CollideError, InstanceId, PenetrationOptions, clearance, deepest_penetration,
@@ -6,11 +8,14 @@ use tesdf::collide::{
 };
 use tesdf::glam::DVec3;
 
-use crate::joint::wrapped;
+pub use crate::joint::{relative, rotation_between, wrapped};
 use crate::{Joint, JointKind, Mass, MassProperties, Motor, System};
 
 /// The number of the body of this name.
-pub(super) fn body(system: &System, name: &str) -> Result<usize, String> {
+///
+/// # Errors
+/// There is no such body.
+pub fn body(system: &System, name: &str) -> Result<usize, String> {
     let names = || system.bodies().iter().map(|b| b.name.as_str()).collect::<Vec<_>>().join(", ");
     let found = system.bodies().iter().position(|b| b.name == name);
     found.ok_or_else(|| format!("there is no body {name}; the bodies are {}", names()))
@@ -18,7 +23,10 @@ pub(super) fn body(system: &System, name: &str) -> Result<usize, String> {
 
 /// The number and mass of the free body of this name. `verb` says what no contact could do to it
 /// otherwise: `stop`, for example.
-pub(super) fn free_body(system: &System, name: &str, verb: &str) -> Result<(usize, MassProperties), String> {
+///
+/// # Errors
+/// There is no such body, or it is fixed or kinematic.
+pub fn free_body(system: &System, name: &str, verb: &str) -> Result<(usize, MassProperties), String> {
     let body = body(system, name)?;
     match system.bodies()[body].mass {
         Mass::Free(mass) => Ok((body, mass)),
@@ -28,7 +36,10 @@ pub(super) fn free_body(system: &System, name: &str, verb: &str) -> Result<(usiz
 }
 
 /// The axis, when its length is 1.
-pub(super) fn unit(axis: [f64; 3]) -> Result<DVec3, String> {
+///
+/// # Errors
+/// It has another length.
+pub fn unit(axis: [f64; 3]) -> Result<DVec3, String> {
     let axis = DVec3::from_array(axis);
     match (axis.length() - 1.0).abs() <= 1e-6 {
         true => Ok(axis),
@@ -37,7 +48,10 @@ pub(super) fn unit(axis: [f64; 3]) -> Result<DVec3, String> {
 }
 
 /// Checks that each of these values is finite and greater than 0.
-pub(super) fn positive<const N: usize>(values: [(&str, f64); N]) -> Result<(), String> {
+///
+/// # Errors
+/// The name and value of the first one that is not.
+pub fn positive<const N: usize>(values: [(&str, f64); N]) -> Result<(), String> {
     match values.into_iter().find(|&(_, value)| !(value > 0.0 && value.is_finite())) {
         Some((key, value)) => Err(format!("{key} is {value}; expected a positive number")),
         None => Ok(()),
@@ -46,19 +60,19 @@ pub(super) fn positive<const N: usize>(values: [(&str, f64); N]) -> Result<(), S
 
 /// Measurements of the exact clearance at regular times.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Checks {
+pub struct Checks {
     every: f64,
     time: f64,
 }
 
 impl Checks {
     /// A check for each `every` seconds.
-    pub(super) fn new(every: f64) -> Self {
+    pub fn new(every: f64) -> Self {
         Self { every, time: 0.0 }
     }
 
     /// Whether a check is due within the next `time_step` seconds.
-    pub(super) fn due(&mut self, time_step: f64) -> bool {
+    pub fn due(&mut self, time_step: f64) -> bool {
         let number = |time: f64| (time / self.every + 1e-9).floor();
         let before = number(self.time);
         self.time += time_step;
@@ -68,25 +82,25 @@ impl Checks {
 
 /// What exact measurements of the clearance found.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Penetration {
+pub struct Penetration {
     /// The greatest penetration, m; 0 when none was found.
-    pub(super) depth: f64,
+    pub depth: f64,
     /// Number of measurements.
-    pub(super) measurements: usize,
+    pub measurements: usize,
     /// Reasons of measurements that failed.
-    pub(super) unmeasured: Vec<String>,
+    pub unmeasured: Vec<String>,
 }
 
 impl Penetration {
     /// Measures the penetration of pairs of instances at the current states, to `tolerance` metres.
     /// What cannot be deeper than all before is not searched.
-    pub(super) fn measure(&mut self, system: &System, pairs: &[[InstanceId; 2]], tolerance: f64) {
+    pub fn measure(&mut self, system: &System, pairs: &[[InstanceId; 2]], tolerance: f64) {
         let measured = at_states(system, |system| self.deepen(system, pairs, tolerance));
         self.unmeasured.extend(measured.err());
     }
 
     /// As [`measure`](Self::measure), of all pairs whose bounds overlap at the current states.
-    pub(super) fn measure_all(&mut self, system: &System, tolerance: f64) {
+    pub fn measure_all(&mut self, system: &System, tolerance: f64) {
         let measured = at_states(system, |system| {
             let pairs = pairs_within(system, 0.0)?;
             self.deepen(system, &pairs, tolerance)
@@ -111,7 +125,7 @@ impl Penetration {
     }
 
     /// The failures, when at most `allowed` metres of penetration are.
-    pub(super) fn failures(&self, allowed: f64) -> Vec<String> {
+    pub fn failures(&self, allowed: f64) -> Vec<String> {
         let mut failures: Vec<String> =
             self.unmeasured.iter().map(|e| format!("penetration: not measured: {e}")).collect();
         if self.depth > allowed {
@@ -130,11 +144,10 @@ impl Penetration {
 
 /// The least exact clearance of pairs of instances at the current states, m, to `tolerance` metres;
 /// infinite without pairs.
-pub(super) fn least_distance(
-    system: &System,
-    pairs: &[[InstanceId; 2]],
-    tolerance: f64,
-) -> Result<f64, String> {
+///
+/// # Errors
+/// A clearance cannot be measured.
+pub fn least_distance(system: &System, pairs: &[[InstanceId; 2]], tolerance: f64) -> Result<f64, String> {
     let options = ClearanceOptions { tolerance: Length::Absolute(tolerance) };
     at_states(system, |system| {
         let distance = |&[a, b]: &[InstanceId; 2]| Ok(clearance(system.scene(), a, b, &options)?.distance);
@@ -144,7 +157,10 @@ pub(super) fn least_distance(
 }
 
 /// The pairs of instances whose bounds come within `distance` metres at the current states.
-pub(super) fn near(system: &System, distance: f64) -> Result<Vec<[InstanceId; 2]>, String> {
+///
+/// # Errors
+/// The states are not those of the scene.
+pub fn near(system: &System, distance: f64) -> Result<Vec<[InstanceId; 2]>, String> {
     at_states(system, |system| pairs_within(system, distance))
 }
 
@@ -165,7 +181,7 @@ fn at_states<T>(system: &System, measure: impl FnOnce(&System) -> Result<T, Stri
 
 /// A hinge whose turns are counted.
 #[derive(Clone, Debug)]
-pub(super) struct Hinge {
+pub struct Hinge {
     /// The number of the joint.
     joint: usize,
     /// The angle within ±π at the last step, rad.
@@ -174,7 +190,10 @@ pub(super) struct Hinge {
 
 impl Hinge {
     /// The hinge of this name, from the current state on.
-    pub(super) fn new(system: &System, name: &str) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// There is no such joint, or it is no hinge.
+    pub fn new(system: &System, name: &str) -> Result<Self, String> {
         let joints = system.joints();
         let names = || joints.iter().map(|j| j.name.as_str()).collect::<Vec<_>>().join(", ");
         let joint = joints.iter().position(|j| j.name == name);
@@ -186,17 +205,17 @@ impl Hinge {
     }
 
     /// The body that it turns.
-    pub(super) fn child(&self, system: &System) -> usize {
+    pub fn child(&self, system: &System) -> usize {
         system.joints()[self.joint].child
     }
 
     /// What drives it.
-    pub(super) fn motor(&self, system: &System) -> Option<Motor> {
+    pub fn motor(&self, system: &System) -> Option<Motor> {
         system.joints()[self.joint].motor
     }
 
     /// The names of the other joints that hold the body that it turns.
-    pub(super) fn others<'a>(&self, system: &'a System) -> impl Iterator<Item = &'a str> {
+    pub fn others<'a>(&self, system: &'a System) -> impl Iterator<Item = &'a str> {
         let (own, body) = (self.joint, self.child(system));
         let holds = move |joint: &Joint| joint.child == body || joint.parent == Some(body);
         let others = system.joints().iter().enumerate().filter(move |&(k, joint)| k != own && holds(joint));
@@ -204,7 +223,7 @@ impl Hinge {
     }
 
     /// The speed, rad/s.
-    pub(super) fn speed(&self, system: &System) -> f64 {
+    pub fn speed(&self, system: &System) -> f64 {
         let joint = &system.joints()[self.joint];
         let states = system.states();
         let [parent, child] = [joint.parent, Some(joint.child)]
@@ -215,7 +234,7 @@ impl Hinge {
 
     /// The angle by which it has turned in a step of `time_step` seconds, rad. Whole turns are
     /// those of the speed: without contacts, a load makes a shaft fast.
-    pub(super) fn turned(&mut self, system: &System, time_step: f64) -> f64 {
+    pub fn turned(&mut self, system: &System, time_step: f64) -> f64 {
         let now = angle(system, self.joint);
         let way = self.speed(system) * time_step;
         let turned = way + wrapped(now - self.last - way);
@@ -231,7 +250,7 @@ fn angle(system: &System, joint: usize) -> f64 {
 }
 
 /// The row of the exact clearance in the text of a report.
-pub(super) fn clearance_row(penetration: f64, measurements: usize) -> (&'static str, String) {
+pub fn clearance_row(penetration: f64, measurements: usize) -> (&'static str, String) {
     let plural = if measurements == 1 { "" } else { "s" };
     let penetration = 1e6 * penetration;
     (

@@ -1,5 +1,4 @@
 //! Grippers put a peg into its hole and a nut onto its bolt.
-
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -7,25 +6,21 @@ use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::write;
 use tesdf::save::{Destination, SaveOptions};
+use tesdf_lab::scenes::{AssemblyCriterion, AssemblyReport, AssemblyTracker, Plan};
 use tesdf_parts::{Nut, Resolution, Size, Thread};
-use tesdf_sim::criterion::{AssemblyCriterion, AssemblyReport, AssemblyTracker, Tracker};
+use tesdf_sim::criterion::Tracker;
 use tesdf_sim::record::{InterruptedRun, RunJournal, RunOrigin};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Dynamics, PartialRun, RunRecord, State, Summary, System, Wrench, simulate_from};
 
+use crate::support::{self, balls, parse, text_of};
+
 /// Time in which the short form ends, s.
 const END: f64 = 8.0;
 
-/// The scene of the repository with one peg and one nut. Each gripper does a task.
+/// The scene of the laboratory with one peg and one nut.
 fn text() -> String {
-    let text = std::fs::read_to_string(crate::support::path_of("robo-assembly")).unwrap();
-    let (before, tasks) = text.split_once("[[plan.tasks]]").expect("the tasks");
-    let task = |part: &str| {
-        let of_part = |task: &&str| task.contains(&format!("part = \"{part}\""));
-        let task = tasks.split("[[plan.tasks]]").find(of_part).expect(part);
-        format!("[[plan.tasks]]{task}\n")
-    };
-    let mut text = format!("{before}{}{}", task("peg0"), task("nut0").replace("left", "right"));
+    let mut text = text_of("robo-assembly");
     for (from, to) in [
         ("count = 3", "count = 1"),
         ("count = 7", "count = 1"),
@@ -39,15 +34,35 @@ fn text() -> String {
     text
 }
 
+/// Its plan. Each gripper does a task.
+fn plan_text() -> String {
+    let text = text_of("robo-assembly-plan");
+    let (before, tasks) = text.split_once("[[tasks]]").expect("the tasks");
+    let task = |part: &str| {
+        let of_part = |task: &&str| task.contains(&format!("part = \"{part}\""));
+        let task = tasks.split("[[tasks]]").find(of_part).expect(part);
+        format!("[[tasks]]{task}\n")
+    };
+    format!("{before}{}{}", task("peg0"), task("nut0").replace("left", "right"))
+}
+
+/// The scene of `text` with the scripts of `plan`.
+fn planned(text: String, plan: &str) -> Result<LoadedScene, String> {
+    let mut loaded = parse(text, "robo-assembly").unwrap();
+    let plan: Plan = toml::from_str(plan).unwrap();
+    let scripts = plan.scripts(&loaded.scene)?;
+    loaded.scene.scripts.extend(scripts);
+    Ok(loaded)
+}
+
 fn load(text: String) -> LoadedScene {
-    LoadedScene::parse(text, crate::support::path_of("robo-assembly")).unwrap()
+    planned(text, &plan_text()).unwrap()
 }
 
 fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
     let mut loaded = load(text());
     change(&mut loaded);
-    let system = loaded.system().unwrap();
-    crate::support::run(&loaded, system)
+    support::run(&loaded)
 }
 
 fn failures(summary: &Summary) -> String {
@@ -150,19 +165,10 @@ fn any_number_of_threads_and_a_resumed_run_give_the_same_states() {
     assert_eq!(one, states(2, Some(250)));
 }
 
-/// The short form with balls of 1 mm in place of meshes.
-fn balls() -> String {
-    let line = |line: &str| match line.starts_with("mesh = ") {
-        true => "shape = { sphere = { radius = 0.001 } }\n".into(),
-        false => format!("{line}\n"),
-    };
-    text().lines().map(line).collect()
-}
-
 /// The report of a run in which the peg is in its place and the nut goes down its bolt, changed at
 /// each share of the run.
 fn report(change: impl Fn(&mut System, f64)) -> AssemblyReport {
-    let loaded = load(balls());
+    let loaded = load(balls(&text()));
     let mut system = loaded.system().unwrap();
     let mut tracker =
         AssemblyTracker::new(loaded.scene.criterion.get::<AssemblyCriterion>().unwrap(), &system).unwrap();
@@ -249,8 +255,7 @@ fn each_failure_has_its_name() {
 
 #[test]
 fn what_is_no_assembly_is_refused() {
-    // The shapes are of no account.
-    let text = balls();
+    let text = balls(&text());
     let section = "[[criterion.assembly.nuts]]";
     let script = format!("[[scripts]]\nbody = \"peg0\"\nkeyframes = [{{ time = 0 }}]\n\n{section}");
     let joint = format!("[[joints]]\nname = \"hook\"\nkind = \"ball\"\nchild = \"nut0\"\n\n{section}");
@@ -275,12 +280,12 @@ fn what_is_no_assembly_is_refused() {
             "body nut0 starts in its place",
         ),
     ];
-    crate::support::refused(&text, &crate::support::path_of("robo-assembly"), &cases);
+    support::refused(&text, "robo-assembly", &cases);
 }
 
 #[test]
 fn a_plan_that_does_not_fit_is_refused_with_its_place() {
-    let text = text();
+    let (text, plan) = (text(), plan_text());
     let cases = [
         ("part = \"peg0\"", "part = \"pig\"", "task 1 (pig): there is no body pig; give the name of a body"),
         ("gripper = \"right\"", "gripper = \"middle\"", "task 2 (nut0): there is no gripper middle"),
@@ -291,22 +296,20 @@ fn a_plan_that_does_not_fit_is_refused_with_its_place() {
         ("approach = 0.03", "approach = nan", "task 1 (peg0): approach is NaN; expected a positive number"),
         ("press = 2e-4", "press = inf", "press inf m; expected finite numbers"),
         ("tool = [0, 0, -0.115]", "tool = [0, 0, nan]", "gripper left: tool"),
-        ("duration = 8", "duration = 4", "expected at most the duration of 4 s"),
     ];
     for (from, to, expected) in cases {
-        assert!(text.contains(from), "{from}");
-        let refused =
-            LoadedScene::parse(text.replacen(from, to, 1), crate::support::path_of("robo-assembly"));
-        let message = refused.expect_err(expected).to_string();
-        assert!(message.contains(expected) && message.contains("line "), "{message}: expected {expected}");
+        assert!(plan.contains(from), "{from}");
+        let message = planned(text.clone(), &plan.replacen(from, to, 1)).expect_err(expected);
+        assert!(message.contains(expected), "{message}: expected {expected}");
     }
+    let short = planned(text.replace("duration = 8", "duration = 4"), &plan).unwrap_err();
+    assert!(short.contains("expected at most the duration of 4 s"), "{short}");
 }
 
-/// A plan ends as scripts, so that a run that is read again has no plan to expand.
 #[test]
 fn a_plan_becomes_scripts() {
     let loaded = load(text());
-    assert_eq!((loaded.scene.plan.as_ref(), loaded.scene.scripts.len()), (None, 6));
+    assert_eq!(loaded.scene.scripts.len(), 6);
     let wrist = &loaded.scene.scripts[0];
     assert_eq!(wrist.body.as_deref(), Some("left_wrist"));
     let times: Vec<f64> = wrist.keyframes.iter().map(|k| k.time).collect();
@@ -320,6 +323,4 @@ fn a_plan_becomes_scripts() {
     let heights = [turn - 1, turn].map(|k| wrist.keyframes[k].translation.unwrap()[2]);
     assert!((heights[0] - heights[1] - 8e-3).abs() < 1e-12, "{heights:?}");
     assert!((wrist.keyframes[turn].turn.unwrap()[2] + 8.0 * std::f64::consts::PI).abs() < 1e-9);
-    let again = LoadedScene::of_json(serde_json::to_value(&loaded.scene).unwrap(), &loaded.path).unwrap();
-    assert_eq!(again.scene.scripts, loaded.scene.scripts);
 }

@@ -1,13 +1,14 @@
 //! A gearbox turns its output shaft by contact alone.
-
-use tesdf_sim::criterion::{TransmissionCriterion, TransmissionReport};
+use tesdf_lab::scenes::{TransmissionCriterion, TransmissionReport};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{RunRecord, Summary};
+
+use crate::support::{self, balls, parse, text_of};
 
 /// The first two gears of the scene of the repository, with scripts of three seconds: one engages and
 /// drives the output, then the other. After a turn of the input the dogs of the second meet gaps.
 fn text() -> String {
-    let text = std::fs::read_to_string(crate::support::path_of("engine-transmission")).unwrap();
+    let text = text_of("engine-transmission");
     let (bodies, _) = text.split_once("# Between the gears").expect("the comment above the scripts");
     let is_of_both = |block: &&str| {
         let of = |key: &str| block.lines().find_map(|line| line.strip_prefix(key)?.split('"').next());
@@ -53,13 +54,10 @@ keyframes = [
 }
 
 fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
-    let mut loaded = LoadedScene::parse(text(), crate::support::path_of("engine-transmission")).unwrap();
+    let mut loaded = parse(text(), "engine-transmission").unwrap();
     loaded.scene.duration = 3.1;
     change(&mut loaded);
-    let system = loaded.system().unwrap();
-    let (record, mut summary) = crate::support::run(&loaded, system);
-    (summary.detection_ms, summary.solution_ms) = (0.0, 0.0);
-    (record, summary)
+    support::run(&loaded)
 }
 
 /// Only the first second, in which the first gear engages and drives.
@@ -131,14 +129,7 @@ fn wrong_gears_have_another_ratio() {
 
 #[test]
 fn what_is_no_gearbox_is_refused() {
-    // The shapes are of no account.
-    let text = text()
-        .lines()
-        .map(|line| match line.starts_with("mesh = ") {
-            true => "shape = { sphere = { radius = 0.001 } }\n".into(),
-            false => format!("{line}\n"),
-        })
-        .collect::<String>();
+    let text = balls(&text());
     let weld = "[[joints]]\nname = \"held\"\nkind = \"weld\"\nchild = \"output\"\n\n[criterion.transmission]";
     let cases = [
         ("input = \"input\"", "input = \"inptu\"", "there is no joint inptu"),
@@ -155,5 +146,5 @@ fn what_is_no_gearbox_is_refused() {
         ),
         ("[criterion.transmission]", weld, "joint held holds body output too"),
     ];
-    crate::support::refused(&text, &crate::support::path_of("engine-transmission"), &cases);
+    support::refused(&text, "engine-transmission", &cases);
 }

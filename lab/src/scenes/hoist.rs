@@ -3,11 +3,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use serde::{Deserialize, Serialize};
 use tesdf::glam::{DVec2, DVec3};
+use tesdf_sim::criterion::measure::{Checks, Hinge, Penetration, clearance_row, free_body, positive, unit};
+use tesdf_sim::criterion::{Criterion, Report, Rows, Tracker};
+use tesdf_sim::{Joint, JointKind, MassProperties, System};
 
 use super::linking::linking_number;
-use super::shared::{Checks, Hinge, Penetration, clearance_row, free_body, positive, unit};
-use super::{Criterion, Report, Rows, Tracker};
-use crate::{Joint, JointKind, MassProperties, System};
 
 /// Chains that are wound on spools hoist a body. The links hold each other by contact alone: of
 /// each chain only the first link has a weld, to its spool, and the last one, to the body.

@@ -12,13 +12,16 @@
 //! The planner knows where parts start and where they belong. It does not see the run: a part that
 //! slips or falls is missed. So scripts stay functions of time alone.
 use std::f64::consts::TAU;
+use std::fmt::Display;
+use std::path::Path;
 
-use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use tesdf::collide::Pose;
-
-use crate::joint::{relative, rotation_between};
-use crate::script::{Interpolation, Keyframe, Script};
+use tesdf::glam::{DQuat, DVec3};
+use tesdf_cli::terminal::report::Failure;
+use tesdf_sim::criterion::measure::{positive, relative, rotation_between};
+use tesdf_sim::scene_file::SceneFile;
+use tesdf_sim::script::{Interpolation, Keyframe, Script};
 
 /// The shortest time of a motion, s.
 const SHORTEST: f64 = 0.05;
@@ -26,20 +29,20 @@ const SHORTEST: f64 = 0.05;
 /// The way above a part or its place on which a gripper descends slowly, m.
 const NEAR: f64 = 0.01;
 
-/// Grippers, and what they do.
+/// Grippers, and what they do: the content of a plan's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PlanSection {
+pub struct Plan {
     /// The grippers. They work at the same time, each in its own order.
-    pub grippers: Vec<GripperSection>,
+    pub grippers: Vec<Gripper>,
     /// The tasks, in the order in which each gripper does its own.
-    pub tasks: Vec<TaskSection>,
+    pub tasks: Vec<Task>,
 }
 
 /// A gripper, and how it moves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GripperSection {
+pub struct Gripper {
     /// Name, unique among the grippers.
     pub name: String,
     /// Name of the wrist, a kinematic body.
@@ -101,7 +104,7 @@ fn a_turn() -> f64 {
 /// A part that a gripper brings to its place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TaskSection {
+pub struct Task {
     /// Name of the gripper.
     pub gripper: String,
     /// Name of the body that it brings.
@@ -125,13 +128,13 @@ pub struct TaskSection {
     pub press: f64,
     /// What the gripper does on this way.
     #[serde(default)]
-    pub action: TaskAction,
+    pub action: Action,
 }
 
 /// What a gripper does with a part above its place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum TaskAction {
+pub enum Action {
     /// It moves it straight down.
     #[default]
     Insert,
@@ -143,34 +146,53 @@ pub enum TaskAction {
     },
 }
 
-/// The scripts that do the tasks of `plan`, in a scene whose bodies start where `start` says.
-///
-/// # Errors
-/// A message that names the gripper or task, what was found and what was expected.
-pub(crate) fn scripts(
-    plan: &PlanSection,
-    duration: f64,
-    start: impl Fn(&str) -> Result<Pose, String>,
-) -> Result<Vec<Script>, String> {
-    let mut arms: Vec<Arm> = Vec::new();
-    for gripper in &plan.grippers {
-        if arms.iter().any(|arm| arm.gripper.name == gripper.name) {
-            return Err(format!("gripper {}: the name is used twice; give each its own", gripper.name));
+impl Plan {
+    /// Reads a file, TOML.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no plan.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let named = |e: &dyn Display| Failure::new(format!("{}: {e}", path.display()));
+        let text = tesdf::input::read_to_string(path).map_err(|e| named(&e))?;
+        toml::from_str(&text).map_err(|e| named(&e.to_string().trim_end()))
+    }
+
+    /// The scripts that do the tasks with the bodies of `scene`.
+    ///
+    /// # Errors
+    /// A message that names the gripper or task, what was found and what was expected.
+    pub fn scripts(&self, scene: &SceneFile) -> Result<Vec<Script>, String> {
+        let start = |name: &str| start(scene, name);
+        let duration = scene.duration;
+        let mut arms: Vec<Arm> = Vec::new();
+        for gripper in &self.grippers {
+            if arms.iter().any(|arm| arm.gripper.name == gripper.name) {
+                return Err(format!("gripper {}: the name is used twice; give each its own", gripper.name));
+            }
+            arms.push(Arm::new(gripper, &start).map_err(|e| format!("gripper {}: {e}", gripper.name))?);
         }
-        arms.push(Arm::new(gripper, &start).map_err(|e| format!("gripper {}: {e}", gripper.name))?);
+        for (k, task) in self.tasks.iter().enumerate() {
+            let at = |reason: String| format!("task {} ({}): {reason}", k + 1, task.part);
+            let arm = arms.iter_mut().find(|arm| arm.gripper.name == task.gripper);
+            let arm = arm.ok_or_else(|| at(format!("there is no gripper {}", task.gripper)))?;
+            arm.perform(task, &start).map_err(at)?;
+        }
+        arms.iter_mut().for_each(Arm::go_home);
+        let last = arms.iter().map(|arm| arm.time).fold(0.0, f64::max);
+        if last > duration {
+            return Err(format!("the tasks take {last:.3} s; expected at most the duration of {duration} s"));
+        }
+        Ok(arms.into_iter().flat_map(Arm::into_scripts).collect())
     }
-    for (k, task) in plan.tasks.iter().enumerate() {
-        let at = |reason: String| format!("task {} ({}): {reason}", k + 1, task.part);
-        let arm = arms.iter_mut().find(|arm| arm.gripper.name == task.gripper);
-        let arm = arm.ok_or_else(|| at(format!("there is no gripper {}", task.gripper)))?;
-        arm.perform(task, &start).map_err(at)?;
-    }
-    arms.iter_mut().for_each(Arm::go_home);
-    let last = arms.iter().map(|arm| arm.time).fold(0.0, f64::max);
-    if last > duration {
-        return Err(format!("the tasks take {last:.3} s; expected at most the duration of {duration} s"));
-    }
-    Ok(arms.into_iter().flat_map(Arm::into_scripts).collect())
+}
+
+/// Where a body starts.
+fn start(scene: &SceneFile, name: &str) -> Result<Pose, String> {
+    let mut bodies = scene.bodies.iter().map(|body| body.get_ref());
+    let body = bodies.find(|body| body.name == name);
+    let body = body.ok_or_else(|| format!("there is no body {name}; give the name of a body"))?;
+    let (translation, rotation) = (DVec3::from_array(body.translation), DQuat::from_array(body.rotation));
+    Pose::new(translation, rotation).map_err(|e| format!("body {name}: {e}"))
 }
 
 /// Poses of the tool in a task.
@@ -188,14 +210,14 @@ struct Route {
 impl Route {
     /// The route of a part that starts at `part` to a place in `into`, for a tool of this
     /// orientation.
-    fn new(task: &TaskSection, part: Pose, into: Pose, upright: DQuat) -> Result<Self, String> {
-        positive("approach", task.approach)?;
+    fn new(task: &Task, part: Pose, into: Pose, upright: DQuat) -> Result<Self, String> {
+        positive([("approach", task.approach)])?;
         let seat = DVec3::from_array(task.seat);
         // A part with a thread is turned counter-clockwise by a pitch a turn where it is higher.
         let (phase, turn) = match task.action {
-            TaskAction::Insert => (0.0, 0.0),
-            TaskAction::Screw { pitch } => {
-                positive("pitch", pitch)?;
+            Action::Insert => (0.0, 0.0),
+            Action::Screw { pitch } => {
+                positive([("pitch", pitch)])?;
                 (TAU * seat.z / pitch, TAU * task.approach / pitch)
             }
         };
@@ -229,7 +251,7 @@ impl Route {
 
 /// A gripper while its tasks are planned.
 struct Arm<'a> {
-    gripper: &'a GripperSection,
+    gripper: &'a Gripper,
     /// Where the tool starts and ends.
     home: Pose,
     tool: Pose,
@@ -239,20 +261,15 @@ struct Arm<'a> {
 }
 
 impl<'a> Arm<'a> {
-    fn new(
-        gripper: &'a GripperSection,
-        start: &impl Fn(&str) -> Result<Pose, String>,
-    ) -> Result<Self, String> {
+    fn new(gripper: &'a Gripper, start: &impl Fn(&str) -> Result<Pose, String>) -> Result<Self, String> {
         let wrist = start(&gripper.wrist)?;
-        for (key, value) in [
+        positive([
             ("grasp_time", gripper.grasp_time),
             ("speed", gripper.speed),
             ("approach_speed", gripper.approach_speed),
             ("turn_speed", gripper.turn_speed),
             ("screw_speed", gripper.screw_speed),
-        ] {
-            positive(key, value)?;
-        }
+        ])?;
         let tool = DVec3::from_array(gripper.tool);
         if !tool.is_finite() || !gripper.travel_height.is_finite() {
             return Err(format!(
@@ -271,16 +288,12 @@ impl<'a> Arm<'a> {
         })
     }
 
-    fn perform(
-        &mut self,
-        task: &TaskSection,
-        start: &impl Fn(&str) -> Result<Pose, String>,
-    ) -> Result<(), String> {
+    fn perform(&mut self, task: &Task, start: &impl Fn(&str) -> Result<Pose, String>) -> Result<(), String> {
         let upright = self.home.rotation;
         let Route { grasp, begin, end, turn } =
             Route::new(task, start(&task.part)?, start(&task.into)?, upright)?;
-        let GripperSection { close, hold, follow, open, grasp_time, .. } = *self.gripper;
-        let GripperSection { speed, approach_speed, screw_speed, .. } = *self.gripper;
+        let Gripper { close, hold, follow, open, grasp_time, .. } = *self.gripper;
+        let Gripper { speed, approach_speed, screw_speed, .. } = *self.gripper;
         self.move_to(self.above(grasp), speed);
         self.descend(grasp);
         self.drive_fingers(close, grasp_time);
@@ -353,12 +366,5 @@ impl<'a> Arm<'a> {
         let finger =
             |name: &String| script(None, Some(name.clone()), Interpolation::Step, self.fingers.clone());
         std::iter::once(wrist).chain(self.gripper.fingers.iter().map(finger)).collect()
-    }
-}
-
-fn positive(key: &str, value: f64) -> Result<(), String> {
-    match value > 0.0 && value.is_finite() {
-        true => Ok(()),
-        false => Err(format!("{key} is {value}; expected a positive number")),
     }
 }

@@ -2,10 +2,9 @@
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
-
-use super::shared::{Checks, Hinge, Penetration, clearance_row, positive};
-use super::{Criterion, Report, Rows, Tracker};
-use crate::{Drive, Mass, Motor, System};
+use tesdf_sim::criterion::measure::{Checks, Hinge, Penetration, clearance_row, positive};
+use tesdf_sim::criterion::{Criterion, Report, Rows, Tracker};
+use tesdf_sim::{Drive, Mass, Motor, System};
 
 /// A gearbox turns its output shaft at the ratio of each gear in turn, by contact alone, and not in
 /// neutral.

@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
-
-use super::shared::{Checks, Penetration, body, clearance_row, free_body, least_distance, near, positive};
-use super::{Criterion, Report, Rows, Tracker};
-use crate::joint::{relative, wrapped};
-use crate::{Joint, Mass, System};
+use tesdf_sim::criterion::measure::{
+    Checks, Penetration, body, clearance_row, free_body, least_distance, near, positive, relative, wrapped,
+};
+use tesdf_sim::criterion::{Criterion, Report, Rows, Tracker};
+use tesdf_sim::{Joint, Mass, System};
 
 /// Free parts that begin elsewhere end in their places: pegs in holes, nuts on bolts.
 ///
