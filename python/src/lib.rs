@@ -13,7 +13,7 @@ mod device;
 mod encode;
 mod errors;
 mod forces;
-mod given;
+mod instance_columns;
 mod interrupt;
 mod kept_pairs;
 mod mesh;
@@ -27,7 +27,7 @@ mod poses;
 mod scene;
 mod shapes;
 mod simulation;
-mod why;
+mod why_report;
 
 /// The compiled part of the package `tesdf`.
 #[pyo3::pymodule]

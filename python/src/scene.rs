@@ -16,7 +16,7 @@ use crate::contacts::{self, Columns, contacts_of};
 use crate::detection::{self, Keywords};
 use crate::device::{self, HeldDetector};
 use crate::errors::{Error, argument};
-use crate::given::{Given, PerInstance};
+use crate::instance_columns::{InstanceColumns, PerInstance};
 use crate::interrupt::cancellable;
 use crate::pairs::{self, Motions, pairs_of};
 use crate::poses::{self, Count};
@@ -120,7 +120,8 @@ impl Scene {
     ) -> PyResult<u32> {
         let pose = pose.map(|any| poses::poses("pose", any, Count::One)).transpose()?;
         let velocity = velocity.map(|any| poses::velocities("velocity", any, Count::One)).transpose()?;
-        let given = Given::new(1, pose, velocity, &PerInstance { scale, world, memberships, filter })?;
+        let given =
+            InstanceColumns::new(1, pose, velocity, &PerInstance { scale, world, memberships, filter })?;
         let instance = given.row(0, Instance::new(ShapeId(shape), Pose::IDENTITY));
         self.change(py, |scene| scene.add(instance)).map(|id| id.0)
     }
@@ -150,8 +151,12 @@ impl Scene {
         let shape = poses::words("shape", shape, rows)?;
         let velocities =
             velocities.map(|any| poses::velocities("velocities", any, Count::Rows)).transpose()?;
-        let given =
-            Given::new(rows, Some(poses), velocities, &PerInstance { scale, world, memberships, filter })?;
+        let given = InstanceColumns::new(
+            rows,
+            Some(poses),
+            velocities,
+            &PerInstance { scale, world, memberships, filter },
+        )?;
         let instance = |(row, &shape)| given.row(row, Instance::new(ShapeId(shape), Pose::IDENTITY));
         let instances: Vec<Instance> = shape.iter().enumerate().map(instance).collect();
         let ids = self.change(py, |scene| scene.add_many(&instances))?;
@@ -180,8 +185,12 @@ impl Scene {
         let poses = poses.map(|any| poses::poses("poses", any, Count::Rows)).transpose()?;
         let velocities =
             velocities.map(|any| poses::velocities("velocities", any, Count::Rows)).transpose()?;
-        let given =
-            Given::new(ids.len(), poses, velocities, &PerInstance { scale, world, memberships, filter })?;
+        let given = InstanceColumns::new(
+            ids.len(),
+            poses,
+            velocities,
+            &PerInstance { scale, world, memberships, filter },
+        )?;
         self.change(py, |scene| {
             let updated = |(row, &id): (usize, &u32)| {
                 let id = InstanceId(id);
@@ -505,7 +514,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyAny>> {
         let Keywords { options, .. } = Keywords::new("why", options)?;
         let found = self.compute(py, |scene| why(scene, &options, InstanceId(a), InstanceId(b), part))?;
-        crate::why::report(py, &found)
+        crate::why_report::report(py, &found)
     }
 
     /// Number of instances.

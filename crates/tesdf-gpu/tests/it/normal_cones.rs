@@ -33,8 +33,11 @@ fn faces_of_vertices_are_uploaded_when_they_are_needed() {
 const GAPS: [f64; 7] = [0.0, 1e-6, -1e-6, 1e-5, -1e-5, 5e-5, -5e-5];
 
 /// What kernels find, and leave there.
-const ON_DEVICE: [(Mode, ContactsPer); 3] =
-    [(Mode::exact(), ContactsPer::Cell), (Mode::exact(), ContactsPer::Face), (Mode::face(), ContactsPer::Cell)];
+const ON_DEVICE: [(Mode, ContactsPer); 3] = [
+    (Mode::exact(), ContactsPer::Cell),
+    (Mode::exact(), ContactsPer::Face),
+    (Mode::face(), ContactsPer::Cell),
+];
 
 /// The diagonal of the floor is 3.
 const KNOWN: Known = Known { near: 3.0 * ROUNDING, tolerance: 3.0 * ROUNDING, direction: 1e-6 };

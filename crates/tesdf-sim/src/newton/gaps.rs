@@ -6,7 +6,7 @@ use nalgebra::Vector6;
 use tesdf::collide::{Contact, InstanceId, Mode, Pose};
 
 use super::NewtonOptions;
-use super::far::{Far, Reach};
+use super::far_contacts::{FarContacts, Reach};
 use super::normals::normals;
 use super::rows::{Bodies, Center, Row};
 use super::runs::sort_runs;
@@ -142,8 +142,8 @@ impl<'a> Gaps<'a> {
         poses: &[Pose],
         reach: Reach<'_>,
         time: f64,
-    ) -> (Vec<Found<'c>>, Vec<Row>, Far) {
-        let (mut near, mut far) = (Vec::with_capacity(contacts.len()), Far::default());
+    ) -> (Vec<Found<'c>>, Vec<Row>, FarContacts) {
+        let (mut near, mut far) = (Vec::with_capacity(contacts.len()), FarContacts::default());
         let mut pairs: Vec<((InstanceId, InstanceId), Option<Pair>)> = Vec::new();
         for contact in contacts {
             // The contacts of a pair come together.
@@ -260,7 +260,7 @@ impl<'a> Gaps<'a> {
         Beginning { depths, before }: &Beginning<'_>,
         is_hit: &[bool],
         reach: Reach<'_>,
-    ) -> (Vec<Row>, Far) {
+    ) -> (Vec<Row>, FarContacts) {
         let (found, mut rows, mut far) = self.find(contacts, poses, reach, 0.0);
         far.extrapolate(velocities, self.step.h);
         for (found, row) in found.iter().zip(&mut rows) {

@@ -9,7 +9,7 @@ use nalgebra::Vector6;
 use tesdf::collide::{HiddenSearch, Pose};
 
 use super::Newton;
-use super::far::Reach;
+use super::far_contacts::Reach;
 use super::gaps::Found;
 use super::rows::{Row, RowForce};
 use super::step::Step;

@@ -33,7 +33,7 @@ mod bounce;
 mod chains;
 mod deep;
 mod engine;
-mod far;
+mod far_contacts;
 mod gaps;
 mod geometric;
 mod impacts;

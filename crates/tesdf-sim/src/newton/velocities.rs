@@ -8,7 +8,7 @@ use tesdf::collide::{Contact, HiddenSearch, InstanceId, Pose};
 use super::Newton;
 use super::chains::Iterate;
 use super::deep::pair;
-use super::far::Reach;
+use super::far_contacts::Reach;
 use super::geometric::{Loads, Motion, Start};
 use super::integrate::{unpack, velocity};
 use super::islands::spread;

@@ -4,7 +4,7 @@ use super::candidates::{Candidates, Pool, Survivor};
 use super::chains::link_weight;
 use super::doubles::{Doubles, GROUP, dispatch, visit_members};
 use super::plane_rule::{PlaneRule, Rivals, Verdict};
-use super::settled::Settled;
+use super::requirement_set::RequirementSet;
 use super::surface::{Surface, Touching};
 use crate::base::Chains;
 use crate::domain::Cell;
@@ -49,7 +49,7 @@ pub struct Scratch {
     /// For each survivor the weight of the longest chain of rule C that ends there, or [`DROPPED`].
     chained: Vec<u32>,
     pools: Vec<Pool>,
-    pub(super) settled: Settled,
+    pub(super) settled: RequirementSet,
 }
 
 impl Scratch {

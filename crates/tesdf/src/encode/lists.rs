@@ -6,7 +6,7 @@ use super::assemble::collect;
 use super::cell_signs::CellSigns;
 use super::error::EncodeError;
 use super::filter::{PAD, Scratch};
-use super::holds::holds;
+use super::list_proof::holds;
 use super::rank::{Ranked, rank};
 use super::refine::{Leaf, Tree};
 use super::roots::Roots;
@@ -57,7 +57,7 @@ pub struct Finished {
 }
 
 /// The faces of a list before any are added or dropped.
-struct Found {
+struct RankedFaces {
     ranked: Vec<Ranked>,
     proof: Option<Chains>,
 }
@@ -156,7 +156,7 @@ impl Lists<'_> {
         sampling: &Sampling,
         sampler: &dyn Sampler,
         progress: &Progress,
-    ) -> Result<Vec<Option<Found>>, EncodeError> {
+    ) -> Result<Vec<Option<RankedFaces>>, EncodeError> {
         let mut found = Vec::with_capacity(leaves.len());
         for (leaves, cells) in leaves.chunks(SAMPLED_AT_ONCE).zip(cells.chunks(SAMPLED_AT_ONCE)) {
             let listed = leaves.par_iter().zip(cells).filter(|(leaf, _)| matches!(leaf, Leaf::Listed { .. }));
@@ -167,7 +167,7 @@ impl Lists<'_> {
             let of_cell = |scratch: &mut Scratch, (cell, least): (&SampledCell, &Vec<f64>)| {
                 self.sampled_found(cell, least, sampling, scratch)
             };
-            let of_listed: Vec<Found> =
+            let of_listed: Vec<RankedFaces> =
                 listed.par_iter().zip(&distances).map_init(Scratch::default, of_cell).collect();
             let mut of_listed = of_listed.into_iter();
             found.extend(leaves.iter().map(|leaf| match leaf {
@@ -181,7 +181,14 @@ impl Lists<'_> {
 
     /// The faces of a cell's list, before any are added or dropped. `chains` are those of the
     /// filters that left `faces`.
-    fn found(&self, cell: &Cell, faces: &[u32], levels: u32, chains: Chains, scratch: &mut Scratch) -> Found {
+    fn found(
+        &self,
+        cell: &Cell,
+        faces: &[u32],
+        levels: u32,
+        chains: Chains,
+        scratch: &mut Scratch,
+    ) -> RankedFaces {
         match &self.options.method {
             Method::Certified => {
                 let (tight, chains) = match levels {
@@ -199,12 +206,12 @@ impl Lists<'_> {
     }
 
     /// The faces of an exact list, ranked where the list is to be cut.
-    fn proved(&self, cell: &Cell, list: &[u32], chains: Chains, scratch: &mut Scratch) -> Found {
+    fn proved(&self, cell: &Cell, list: &[u32], chains: Chains, scratch: &mut Scratch) -> RankedFaces {
         let (ranked, chains) = match self.options.max_entries {
             Some(most) if list.len() > most as usize => rank(self.surface, cell, list, chains, scratch),
             _ => (list.iter().map(|&face| Ranked { face, order: 0.0, distance: 0.0 }).collect(), chains),
         };
-        Found { ranked, proof: Some(chains) }
+        RankedFaces { ranked, proof: Some(chains) }
     }
 
     /// E_t of Alg. 1: the candidates with a d_f.
@@ -218,15 +225,17 @@ impl Lists<'_> {
         least: &[f64],
         sampling: &Sampling,
         scratch: &mut Scratch,
-    ) -> Found {
+    ) -> RankedFaces {
         let found = cell.faces.iter().zip(least).filter(|(_, least)| least.is_finite());
         let ranked: Vec<Ranked> =
             found.map(|(&face, &distance)| Ranked { face, order: distance, distance }).collect();
-        let Threshold::CoveringRadius = sampling.threshold else { return Found { ranked, proof: None } };
+        let Threshold::CoveringRadius = sampling.threshold else {
+            return RankedFaces { ranked, proof: None };
+        };
         let list: Vec<u32> = ranked.iter().map(|r| r.face).collect();
         match holds(self.surface, &cell.cell, &cell.faces, &list, scratch) {
             Some(chains) => self.proved(&cell.cell, &list, chains, scratch),
-            None => Found { ranked, proof: None },
+            None => RankedFaces { ranked, proof: None },
         }
     }
 
@@ -238,7 +247,7 @@ impl Lists<'_> {
         tetrahedron: Option<&[u32; 4]>,
         faces: &[u32],
         crossing: bool,
-        Found { mut ranked, proof }: Found,
+        RankedFaces { mut ranked, proof }: RankedFaces,
     ) -> List {
         if crossing {
             // The sign of a point is counted over these faces.

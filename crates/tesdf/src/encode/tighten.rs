@@ -2,7 +2,7 @@
 
 use super::candidates::Candidates;
 use super::filter::{Scratch, filter};
-use super::settled::Settled;
+use super::requirement_set::RequirementSet;
 use super::surface::{Requirement, Surface};
 use crate::base::Chains;
 use crate::domain::Cell;
@@ -91,7 +91,7 @@ pub fn needed(
 
 struct Needed<'a> {
     surface: &'a Surface,
-    settled: Settled,
+    settled: RequirementSet,
     /// The heaviest chains of rule C on the way down so far.
     heaviest: Chains,
 }

@@ -3,9 +3,9 @@ use std::cell::RefCell;
 use crate::parallel::*;
 use glam::DVec3;
 
-use super::far::is_near;
+use super::far_points::is_near;
 use super::locate::{FLIGHT, Faces, Place};
-use super::{Answer, Found, Precision};
+use super::{Answer, LocalAnswer, Precision};
 use crate::TeSdf;
 
 /// Number of points per task.
@@ -265,7 +265,7 @@ impl TeSdf {
 
     /// As [`found_exactly`](Self::found_exactly) for several points, in order. `put` receives the
     /// answers.
-    pub(crate) fn found_exactly_all(&self, locals: &[DVec3], mut put: impl FnMut(Found)) {
+    pub(crate) fn found_exactly_all(&self, locals: &[DVec3], mut put: impl FnMut(LocalAnswer)) {
         thread_local! {
             static FACES: RefCell<[Faces; FLIGHT]> = RefCell::default();
         }

@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use super::far::is_near;
+use super::far_points::is_near;
 use super::sign::hinted_side;
 use super::{Answer, ON_SURFACE_F32, ON_SURFACE_F64, Precision, Reads};
 use crate::TeSdf;

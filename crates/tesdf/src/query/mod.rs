@@ -37,7 +37,7 @@ mod arrays;
 mod batch;
 mod by_tree;
 mod cell_bounds;
-mod far;
+mod far_points;
 mod inner_ball;
 mod kernel;
 mod lanes;
@@ -92,7 +92,7 @@ pub(crate) use surroundings::Surroundings;
 use crate::TeSdf;
 use crate::base::Side;
 use crate::geometry::{Closest, Feature};
-use far::is_near;
+use far_points::is_near;
 pub(crate) use sign::Facing;
 use sign::hinted_side;
 
@@ -148,7 +148,7 @@ impl Answer {
 
 /// An answer in the local frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Found {
+pub(crate) struct LocalAnswer {
     /// Distance to the nearest face, negative inside.
     pub signed_distance: f64,
     /// Unit gradient.
@@ -357,7 +357,7 @@ impl TeSdf {
     }
 
     /// The answer at a finite point of the local frame whose place is known.
-    pub(crate) fn found_at(&self, local: DVec3, place: Place, precision: Precision) -> Found {
+    pub(crate) fn found_at(&self, local: DVec3, place: Place, precision: Precision) -> LocalAnswer {
         match place {
             Place::Listed { offset, .. } => {
                 self.with_list(offset, |faces| self.find(local, place, faces, precision))
@@ -368,7 +368,7 @@ impl TeSdf {
 
     /// As [`found_at`](Self::found_at) in `f32`, but with the exact distance also where lists are
     /// not proved exact.
-    pub(crate) fn found_exactly(&self, local: DVec3) -> Found {
+    pub(crate) fn found_exactly(&self, local: DVec3) -> LocalAnswer {
         let place = self.locate(local);
         match place {
             Place::Listed { .. } if !self.has_exact_lists() => {
@@ -381,7 +381,13 @@ impl TeSdf {
     /// The answer at a point of the local frame that is finite and not far. `faces` are those of
     /// the place's list, if it has one.
     #[inline(always)]
-    pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
+    pub(crate) fn find(
+        &self,
+        local: DVec3,
+        place: Place,
+        faces: &Faces,
+        precision: Precision,
+    ) -> LocalAnswer {
         match precision {
             Precision::F32 => self.answer_f32(local, place, faces),
             Precision::F64 => {
@@ -393,7 +399,7 @@ impl TeSdf {
 
     /// Converts from the local frame to the mesh's frame.
     #[inline(always)]
-    fn to_answer(&self, found: Found) -> Answer {
+    fn to_answer(&self, found: LocalAnswer) -> Answer {
         // Half of the thickness is 0 unless the asset is a sheet.
         let half = self.half_thickness;
         Answer {
@@ -405,7 +411,7 @@ impl TeSdf {
     }
 
     #[inline(always)]
-    fn answer_f32(&self, local: DVec3, place: Place, faces: &Faces) -> Found {
+    fn answer_f32(&self, local: DVec3, place: Place, faces: &Faces) -> LocalAnswer {
         let relative = local - self.cube.middle();
         let found = match place {
             Place::Listed { .. } => self.nearest_in_list_f32(faces, relative.as_vec3()),
@@ -443,7 +449,7 @@ impl TeSdf {
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
     }
 
-    fn answer_f64(&self, local: DVec3, place: Place, faces: &Faces) -> Found {
+    fn answer_f64(&self, local: DVec3, place: Place, faces: &Faces) -> LocalAnswer {
         self.answer_f64_and_seen(local, place, faces, &mut |_, _| ())
     }
 
@@ -458,7 +464,7 @@ impl TeSdf {
         faces: &Faces,
         tie: f64,
         near: &mut Vec<(u32, Closest)>,
-    ) -> Found {
+    ) -> LocalAnswer {
         self.store_normals_unless_moved();
         near.clear();
         let found =
@@ -483,7 +489,7 @@ impl TeSdf {
         place: Place,
         faces: &Faces,
         seen: &mut impl FnMut(u32, &Closest),
-    ) -> Found {
+    ) -> LocalAnswer {
         let (position, closest) = match place {
             Place::Listed { .. } => self.nearest_in_list_f64(faces, local, seen),
             _ => self.nearest_in_tree_f64(local, seen),
@@ -511,11 +517,11 @@ impl TeSdf {
         position: u32,
         origin: DVec3,
         on_surface: impl Fn(f64) -> Option<DVec3>,
-    ) -> Found {
+    ) -> LocalAnswer {
         let sign = if side == Side::Inside { -1.0 } else { 1.0 };
         let gradient =
             on_surface(closest.distance).unwrap_or_else(|| (p - closest.point) * (sign / closest.distance));
-        Found {
+        LocalAnswer {
             signed_distance: sign * closest.distance,
             gradient,
             closest_point: closest.point + origin,

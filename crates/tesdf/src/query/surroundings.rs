@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::kernel::{self, LANES};
 use super::locate::{Faces, Place};
-use super::{Found, polygon};
+use super::{LocalAnswer, polygon};
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
 use crate::geometry::{Aabb, Closest};
@@ -34,12 +34,12 @@ pub(crate) struct Surroundings<'a> {
 #[derive(Debug, Default)]
 struct Answers {
     /// In `f64`, with the range of the faces nearby.
-    exact: Vec<(DVec3, Found, Range<usize>)>,
+    exact: Vec<(DVec3, LocalAnswer, Range<usize>)>,
     near: Vec<(u32, Closest)>,
     /// The faces near one point.
     near_one: Vec<(u32, Closest)>,
     /// In `f32`.
-    rough: Vec<(DVec3, Found)>,
+    rough: Vec<(DVec3, LocalAnswer)>,
 }
 
 /// Number of answers that are kept at a time. More would be searched for longer than they save.
@@ -66,7 +66,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// As [`TeSdf::found_exactly`].
-    pub fn found_exactly(&self, p: DVec3) -> Found {
+    pub fn found_exactly(&self, p: DVec3) -> LocalAnswer {
         let rough = &mut self.answers.borrow_mut().rough;
         if let Some((_, found)) = rough.iter().find(|(at, _)| is_same(*at, p)) {
             return *found;
@@ -80,13 +80,18 @@ impl<'a> Surroundings<'a> {
     }
 
     /// As [`TeSdf::found_at`] in `f64`, from the answers that are kept, if it is one of them.
-    pub fn found(&self, p: DVec3) -> Option<Found> {
+    pub fn found(&self, p: DVec3) -> Option<LocalAnswer> {
         self.answers.borrow().exact.iter().find(|(at, ..)| is_same(*at, p)).map(|(_, found, _)| *found)
     }
 
     /// The answer at a point in `f64`, and all faces that are within `tie` of the least distance, as
     /// [`TeSdf::found_with_near`]. All calls have the same tie.
-    pub fn with_near<R>(&self, p: DVec3, tie: f64, then: impl FnOnce(Found, &[(u32, Closest)]) -> R) -> R {
+    pub fn with_near<R>(
+        &self,
+        p: DVec3,
+        tie: f64,
+        then: impl FnOnce(LocalAnswer, &[(u32, Closest)]) -> R,
+    ) -> R {
         let answers = &mut *self.answers.borrow_mut();
         let kept = answers.exact.iter().position(|(at, ..)| is_same(*at, p));
         let kept = kept.unwrap_or_else(|| {

@@ -134,7 +134,7 @@ pub fn verify(
     let samples = options.samples as u64;
     let done = AtomicUsize::new(0);
     let parts = (0..samples.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
-        let mut found = Found::new(&mesh, certificate);
+        let mut found = SampleResults::new(&mesh, certificate);
         let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(samples);
         let count = (indices.end - indices.start) as usize;
         indices.for_each(|index| found.add(asset, &truth, index, sampler.point(index)));
@@ -144,8 +144,8 @@ pub fn verify(
             ControlFlow::Break(()) => None,
         }
     });
-    let found =
-        try_reduce(parts, || Found::new(&mesh, certificate), Found::join).ok_or(VerifyError::Cancelled)?;
+    let found = try_reduce(parts, || SampleResults::new(&mesh, certificate), SampleResults::join)
+        .ok_or(VerifyError::Cancelled)?;
     let precisions = found.comparisons.map(Comparison::report);
     Ok(VerifyReport {
         passed: precisions.iter().all(|p| p.passed) && found.disagreements == 0,
@@ -179,13 +179,13 @@ struct Truth<'a> {
     sign: &'a TrueSign,
 }
 
-struct Found {
+struct SampleResults {
     comparisons: [Comparison; 2],
     brute_force: usize,
     disagreements: usize,
 }
 
-impl Found {
+impl SampleResults {
     fn new(mesh: &TriangleMesh, certificate: &Certificate) -> Self {
         let comparison = |precision| Comparison::new(precision, mesh, certificate);
         Self {

@@ -61,7 +61,7 @@ pub fn kept_at_vertices<V: Ord + Send>(mut keys: Vec<(V, i64, u32, usize)>, coun
 
 /// The contacts of some candidates of an ordered pair.
 #[derive(Default)]
-pub struct Found {
+pub struct CandidateContacts {
     /// The contacts, in the order of the candidates.
     pub contacts: Vec<Contact>,
     /// Those at vertices that other faces may have, too.
@@ -73,13 +73,13 @@ pub struct Found {
 }
 
 /// Middle phase, narrow phase and filters.
-pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
-    let mut found = Found::default();
+pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> CandidateContacts {
+    let mut found = CandidateContacts::default();
     found.extend(pair, candidates);
     found
 }
 
-impl Found {
+impl CandidateContacts {
     /// Adds the contacts of more candidates.
     pub fn extend(&mut self, pair: &OrderedPair, candidates: &[u32]) {
         if matches!(pair.field.field, Field::Simple(_)) {

@@ -16,7 +16,9 @@ use crate::parallel::*;
 
 use crate::collide::bodies::surface::Candidates;
 use crate::collide::cones::{Cones, keep_different};
-use crate::collide::detect::candidate_contacts::{AtVertex, Found, contacts, one_per_vertex, order, retain};
+use crate::collide::detect::candidate_contacts::{
+    AtVertex, CandidateContacts, contacts, one_per_vertex, order, retain,
+};
 use crate::collide::detect::ordered_pair::OrderedPair;
 use crate::collide::mode::ContactsPer;
 use crate::collide::options::{CollideOptions, Reduction};
@@ -177,11 +179,11 @@ fn of_pairs_by(
     };
     let tasks = tasks(pairs, &candidates);
     let contacts_of = |(pair, chunk): &(&OrderedPair, &[u32])| {
-        if stopped() { Found::default() } else { contacts(pair, chunk) }
+        if stopped() { CandidateContacts::default() } else { contacts(pair, chunk) }
     };
-    let found: Vec<Found> = match is_small {
+    let found: Vec<CandidateContacts> = match is_small {
         true => {
-            let mut all = Found::default();
+            let mut all = CandidateContacts::default();
             let open = tasks.iter().take_while(|_| !stopped());
             open.for_each(|(pair, chunk)| all.extend(pair, chunk));
             vec![all]

@@ -15,7 +15,9 @@ use glam::DVec3;
 
 use crate::asset::layout::TreeChild;
 use crate::collide::bodies::field::ROUNDING;
-use crate::collide::detect::candidate_contacts::{AtVertex, Found, contacts, one_per_vertex, order};
+use crate::collide::detect::candidate_contacts::{
+    AtVertex, CandidateContacts, contacts, one_per_vertex, order,
+};
 use crate::collide::detect::hidden;
 use crate::collide::detect::ordered_pair::OrderedPair;
 use crate::collide::options::CollideOptions;
@@ -44,7 +46,7 @@ struct Region {
 /// What a dive into a region has found.
 #[derive(Default)]
 struct Dive {
-    found: Found,
+    found: CandidateContacts,
     candidates: usize,
     /// Lower bound of the distances of contacts that were not searched for; infinite without any.
     left: f64,
@@ -98,7 +100,7 @@ fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
     };
     let mut statistics = Statistics::default();
     let mut left = f64::INFINITY;
-    let mut own: Vec<Found> = orders.iter().map(|_| Found::default()).collect();
+    let mut own: Vec<CandidateContacts> = orders.iter().map(|_| CandidateContacts::default()).collect();
     for (region, dive) in regions.iter().zip(dives) {
         let Dive { found, candidates, left: of_dive } = dive;
         statistics.candidates += candidates;
@@ -119,7 +121,7 @@ fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
         kept.contacts.push(found.contacts[deepest]);
     }
     let mut kept: Vec<Contact> = Vec::new();
-    for Found { contacts, at_vertices, .. } in own {
+    for CandidateContacts { contacts, at_vertices, .. } in own {
         let mut contacts = one_per_vertex(contacts, &at_vertices);
         contacts.sort_by_key(order);
         kept.extend(contacts);

@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use crate::geometry::Feature;
-use crate::query::Found;
+use crate::query::LocalAnswer;
 
 /// The value of a field at a point, in the field's frame.
 #[derive(Clone, Copy, Debug)]
@@ -29,9 +29,9 @@ impl FieldValue {
     }
 }
 
-impl From<Found> for FieldValue {
-    fn from(found: Found) -> Self {
-        let Found { signed_distance: distance, gradient, closest_point, position, feature } = found;
+impl From<LocalAnswer> for FieldValue {
+    fn from(found: LocalAnswer) -> Self {
+        let LocalAnswer { signed_distance: distance, gradient, closest_point, position, feature } = found;
         Self { distance, gradient, closest_point, position, feature }
     }
 }

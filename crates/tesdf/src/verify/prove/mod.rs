@@ -48,7 +48,7 @@ use crate::domain::Cell;
 pub use report::{Claim, Fault, ProveReport, Tally, Verdict};
 use signs::Signs;
 use surface::Surface;
-use walk::{Found, Walk};
+use walk::{CellResults, Walk};
 use winding::Rays;
 
 /// Limits of [`prove`].
@@ -177,8 +177,8 @@ pub fn prove(
     let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
     let cells = || (0..roots.len()).into_par_iter().map(|root| walk.root(root, &all));
     // The search recurses for each cut, so it needs large stacks.
-    let mut found =
-        with_stack(STACK, || reduce(cells(), Found::default, Found::join)).ok_or(ProveError::Threads)?;
+    let mut found = with_stack(STACK, || reduce(cells(), CellResults::default, CellResults::join))
+        .ok_or(ProveError::Threads)?;
     if walk.is_cancelled() {
         return Err(ProveError::Cancelled);
     }

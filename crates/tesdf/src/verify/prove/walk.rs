@@ -13,7 +13,7 @@ use crate::domain::Cell;
 
 /// Results for some cells, in their order.
 #[derive(Default)]
-pub struct Found {
+pub struct CellResults {
     pub distances: Tally,
     pub signs: Tally,
     pub pieces: u64,
@@ -21,7 +21,7 @@ pub struct Found {
     pub faults: Vec<Fault>,
 }
 
-impl Found {
+impl CellResults {
     pub fn join(mut self, other: Self) -> Self {
         self.faults.extend(other.faults);
         self.faults.truncate(ProveReport::FAULTS);
@@ -62,14 +62,14 @@ pub struct Walk<'a, P> {
 
 impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
     /// Checks a root and all cells below it. `faces` must contain all faces that can matter in it.
-    pub fn root(&self, root: usize, faces: &[u32]) -> Found {
+    pub fn root(&self, root: usize, faces: &[u32]) -> CellResults {
         let cell = self.asset.root(root);
         let near = self.near(&cell, faces);
         let found = self.below(root as u32, cell, &near);
         if self.asset.conforming.is_none() {
             return found;
         }
-        let mut of_root = Found::default();
+        let mut of_root = CellResults::default();
         of_root.sign(self.signs.root_fault(root, &cell, &near));
         of_root.join(found)
     }
@@ -81,9 +81,9 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
     }
 
     /// Checks the cells below a word. `near` are the faces near the cell.
-    fn below(&self, word: u32, cell: Cell, near: &[u32]) -> Found {
+    fn below(&self, word: u32, cell: Cell, near: &[u32]) -> CellResults {
         if self.is_cancelled() {
-            return Found::default();
+            return CellResults::default();
         }
         let node = Node::decode(self.asset.nodes[word as usize], &self.asset.lists);
         let found = match node {
@@ -108,8 +108,8 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    fn leaf(&self, word: u32, cell: &Cell, node: Node, near: &[u32]) -> Found {
-        let mut found = Found::default();
+    fn leaf(&self, word: u32, cell: &Cell, node: Node, near: &[u32]) -> CellResults {
+        let mut found = CellResults::default();
         let list = match node {
             Node::Listed(_, offset) => self.asset.with_list(offset, |faces| faces.ids().to_vec()),
             _ => Vec::new(),

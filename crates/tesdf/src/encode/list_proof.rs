@@ -1,7 +1,7 @@
 //! Proves, by the certified filter, that a list from elsewhere is exact.
 use super::candidates::Candidates;
 use super::filter::{Scratch, filter};
-use super::settled::Settled;
+use super::requirement_set::RequirementSet;
 use super::surface::Surface;
 use crate::base::Chains;
 use crate::domain::Cell;
@@ -36,7 +36,7 @@ fn descend(
     surface: &Surface,
     cell: Cell,
     candidates: &Candidates,
-    listed: &Settled,
+    listed: &RequirementSet,
     (levels, chains): (u32, Chains),
     scratch: &mut Scratch,
 ) -> Option<Chains> {

@@ -35,7 +35,7 @@ impl Reach<'_> {
 
 /// The contacts without rows.
 #[derive(Clone, Debug, Default)]
-pub struct Far {
+pub struct FarContacts {
     contacts: Vec<FarContact>,
     /// The centres of the bodies of each pair.
     pairs: Vec<[Option<Center>; 2]>,
@@ -50,7 +50,7 @@ struct FarContact {
     pair: usize,
 }
 
-impl Far {
+impl FarContacts {
     /// Adds a contact between bodies with these centres. The contacts of a pair come together.
     pub fn push(&mut self, gap: f64, normal: DVec3, point: DVec3, centers: &[Option<Center>; 2]) {
         if self.pairs.last() != Some(centers) {
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn a_far_contact_closes_when_its_row_would() {
         let center = |free: usize, x: f64| Some(Center { free, place: DVec3::new(x, 0.0, 0.0) });
-        let mut far = Far::default();
+        let mut far = FarContacts::default();
         far.push(1e-3, DVec3::Z, DVec3::new(0.1, 0.0, 0.0), &[center(0, 0.0), center(1, 0.2)]);
         let velocities = |rise: f64, turn: f64| {
             [pack(DVec3::ZERO, DVec3::ZERO), pack(rise * DVec3::Z, DVec3::new(0.0, turn, 0.0))]

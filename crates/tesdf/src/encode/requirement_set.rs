@@ -3,7 +3,7 @@ use crate::geometry::Feature;
 
 /// A set of requirements, with the requirements that its faces imply.
 #[derive(Debug, Default)]
-pub struct Settled {
+pub struct RequirementSet {
     list: Vec<Requirement>,
     /// By the index of a requirement, a mark: `round` when it was implied in this round, `round +
     /// 1` when it was settled.
@@ -11,7 +11,7 @@ pub struct Settled {
     round: u64,
 }
 
-impl Settled {
+impl RequirementSet {
     /// Empties the set.
     pub(super) fn start(&mut self, surface: &Surface) {
         self.list.clear();

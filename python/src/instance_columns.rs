@@ -6,7 +6,7 @@ use crate::errors::argument;
 use crate::poses;
 
 /// What the arguments of `add` and `update` say about rows of instances.
-pub struct Given {
+pub struct InstanceColumns {
     poses: Option<Vec<Pose>>,
     velocities: Option<Vec<collide::Velocity>>,
     scale: Option<Vec<f64>>,
@@ -23,7 +23,7 @@ pub struct PerInstance<'a, 'py> {
     pub filter: Option<&'a Bound<'py, PyAny>>,
 }
 
-impl Given {
+impl InstanceColumns {
     /// Converts the arguments for this number of rows.
     ///
     /// # Errors
