@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use tesdf_cli::terminal::report::{self, Failure};
 use tesdf_gpu::GpuError;
 use tesdf_gpu::cuda::{self, CudaSource, Resources};
+use tesdf_cli::terminal::report::{self, Failure};
 
 /// Arguments of `tesdf-lab kernels`.
 #[derive(clap::Args, Debug)]
