@@ -45,9 +45,8 @@ fn on_plane(shape: Shape, pose: Pose) -> (usize, usize) {
         scene.add(Instance::new(shape, pose)).expect("a valid pose");
     }
     let options = CollideOptions {
-        contacts_per: ContactsPer::Minimum,
         contact_distance: 0.01,
-        ..CollideOptions::with_mode(Mode::Exact)
+        ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Minimum))
     };
     detect(&scene, &options).expect("detects");
     let before = ALLOCATIONS.get();

@@ -10,11 +10,7 @@ use crate::kernels::scene::pose_arrays::{POSE, UNIT_LENGTH, VELOCITY};
 /// Poses and velocities of all instances of a scene, on the device. Row *i* is that of the *i*-th
 /// instance in the order of ids.
 #[derive(Clone, Copy)]
-<<<<<<<< HEAD:crates/tesdf-gpu/src/collide/pose_arrays.rs
 pub struct PoseArrays<'a> {
-========
-pub struct DevicePoses<'a> {
->>>>>>>> 34d76743 (Name files and types of list proofs, far points and contacts, device poses and results by what they are):crates/tesdf-gpu/src/collide/device_poses.rs
     /// `[N, 7]`: x y z of the translation in the world's unit, and the unit quaternion qx qy qz qw,
     /// whose length may be off by 1e-5.
     pub poses: &'a DeviceArray<f32>,
@@ -24,11 +20,7 @@ pub struct DevicePoses<'a> {
     pub velocities: Option<&'a DeviceArray<f32>>,
 }
 
-<<<<<<<< HEAD:crates/tesdf-gpu/src/collide/pose_arrays.rs
 impl PoseArrays<'_> {
-========
-impl DevicePoses<'_> {
->>>>>>>> 34d76743 (Name files and types of list proofs, far points and contacts, device poses and results by what they are):crates/tesdf-gpu/src/collide/device_poses.rs
     /// Checks the lengths of the arrays for this number of instances.
     pub(super) fn check(&self, instances: usize) -> Result<(), GpuError> {
         let check = |array, found: usize, each: u32| {
@@ -76,13 +68,8 @@ impl DevicePoses<'_> {
     }
 }
 
-<<<<<<<< HEAD:crates/tesdf-gpu/src/collide/pose_arrays.rs
 /// A row of [`PoseArrays`].
 struct PoseRow {
-========
-/// A row of [`DevicePoses`].
-struct GivenRow {
->>>>>>>> 34d76743 (Name files and types of list proofs, far points and contacts, device poses and results by what they are):crates/tesdf-gpu/src/collide/device_poses.rs
     pose: [f32; POSE as usize],
     velocity: Option<[f32; VELOCITY as usize]>,
 }

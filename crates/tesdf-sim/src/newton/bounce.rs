@@ -15,7 +15,7 @@ use nalgebra::{Matrix6, Vector6};
 use tesdf::collide::Contact;
 
 use super::Newton;
-use super::far::Reach;
+use super::far_contacts::Reach;
 use super::gaps::Found;
 use super::geometric::Motion;
 use super::integrate::{pack, unpack, velocity};
