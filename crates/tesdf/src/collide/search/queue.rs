@@ -122,6 +122,7 @@ mod tests {
             ControlFlow::Continue(())
         });
         assert_eq!(odd, Some((3.0, 1)));
-        assert_eq!((queue.len(), queue.items.len()), (queue.into_items().count(), 4));
+        assert_eq!((queue.added, queue.len(), queue.items.len()), (13, 6, 7));
+        assert_eq!(queue.into_items().count(), 6);
     }
 }
