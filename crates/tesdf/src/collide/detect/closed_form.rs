@@ -36,7 +36,7 @@ pub fn minima(
 }
 
 /// The minima of a large segment or triangle over the plane z = 0: its lowest point, and its other
-/// corners within reach if it looks at the plane.
+/// corners within reach if it looks at the plane. Returns `false` where corners are out of reach.
 fn over_plane(part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool {
     let points = part.points();
     let is_triangle = points.len() == 3;
@@ -48,7 +48,7 @@ fn over_plane(part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool 
     let center = (points[0] + points[1] + points[points.len() - 1]) / 3.0;
     let lower = |p: DVec3, q: DVec3| if q.z < p.z { q } else { p };
     let lowest = points[1..].iter().chain([&center]).fold(points[0], |p, q| lower(p, *q));
-    // A normal of a triangle turns away from the plane, or lies in it: then no corner is an extreme.
+    // The extremes of a triangle are where the plane opposes it.
     let has_extremes = !is_triangle || part.normal.z < OPPOSES;
     // The search moves a corner that is out of reach inwards.
     if is_triangle && has_extremes && points.iter().any(|p| p.z > reach) {
@@ -80,12 +80,7 @@ mod tests {
     use crate::collide::scene::pose::Pose;
     use crate::collide::scene::shape::Shape;
     use crate::collide::scene::{Instance, Scene};
-
-    /// A number from 0 to 1 that a number of a sequence gives.
-    fn random(k: &mut u64) -> f64 {
-        *k = k.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (*k >> 11) as f64 / (1u64 << 53) as f64
-    }
+    use crate::testing::random;
 
     type Bits = ([u64; 8], Option<u8>, bool, bool);
 

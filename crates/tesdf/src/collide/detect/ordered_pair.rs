@@ -272,3 +272,60 @@ impl<'a> OrderedPair<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+    use crate::collide::scene::Instance;
+    use crate::collide::scene::pose::Pose;
+    use crate::testing::random;
+
+    /// Of the points of a box at random poses over other shapes: its corners, and points near them, on
+    /// its edges and sides.
+    #[test]
+    fn nothing_falls_where_a_box_tells_that_it_does_not() {
+        let mut state = 1;
+        let (mut told, mut falling) = (0, 0);
+        for case in 0..4000 {
+            let mut number = || random(&mut state);
+            let half_extents = 0.2 + DVec3::new(number(), number(), number());
+            let field = match case % 3 {
+                0 => Shape::Plane,
+                1 => Shape::Sphere { radius: 0.5 + number() },
+                _ => Shape::Box { half_extents: 0.2 + DVec3::new(number(), number(), number()) },
+            };
+            let axis = (DVec3::new(number(), number(), number()) - 0.5).normalize();
+            let rotation = DQuat::from_axis_angle(axis, [0.0, 0.05, 0.3, 3.0][case / 3 % 4] * number());
+            let translation = DVec3::new(number() - 0.5, number() - 0.5, 1.5 * number());
+            let mut scene = Scene::new();
+            let shapes =
+                [(Shape::Box { half_extents }, Pose { translation, rotation }), (field, Pose::IDENTITY)];
+            let [a, b] = shapes.map(|(shape, pose)| {
+                let shape = scene.add_shape(shape).expect("valid sizes");
+                scene.add(Instance::new(shape, pose)).expect("a valid pose")
+            });
+            let options = CollideOptions::default();
+            let pair = OrderedPair::new(&scene, &options, a, b, 10.0).expect("instances of the scene");
+            for face in 0..pair.surface.face_count() {
+                let Some(triangle) = pair.surface.face_triangle(face) else { continue };
+                let [p, q, r] = triangle.corners;
+                let near = [1e-3, 1e-5, 1e-7][case % 3];
+                for point in
+                    [p, q, r, 0.5 * (p + q), p + near * (r - p), q + near * (r - q), (p + q + r) / 3.0]
+                {
+                    let value = pair.field.exact_value(point);
+                    let is_lowest = (case + face as usize).is_multiple_of(2);
+                    let (distance, gradient) = (value.distance, value.gradient);
+                    let at = OnFace { face, point, distance, gradient, is_lowest };
+                    let falls = descends(&pair.surface, &pair.field, &at, |_| true);
+                    let may_fall = pair.surface.may_fall(point, gradient, SLOPE);
+                    assert!(may_fall || !falls, "case {case}, face {face}, {at:?}");
+                    (told, falling) = (told + usize::from(!may_fall), falling + usize::from(falls));
+                }
+            }
+        }
+        assert!(told > 5000 && falling > 5000, "{told} told, {falling} falling");
+    }
+}
