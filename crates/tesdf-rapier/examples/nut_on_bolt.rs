@@ -8,8 +8,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tesdf::collide::ModeName;
 use tesdf::glam::DVec3;
-use tesdf::{CollideOptions, Encoder, Instance, Mode, Pose, Preset, Reduction, Shape, TeSdf};
+use tesdf::{CollideOptions, Encoder, FaceOptions, Instance, Pose, Preset, Reduction, Shape, TeSdf};
 use tesdf_rapier::{RapierEngine, RapierOptions};
 use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker, Tracker};
 use tesdf_sim::{Dynamics, Mass, MassProperties, System};
@@ -23,12 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (nut, bolt) = (argument(0, "iso_m16_nut_c100"), argument(6, "iso_m16_bolt_6k"));
     let seconds: f64 = argument(1, "0.2").parse()?;
     let step = argument(2, "1").parse::<f64>()? * 1e-3;
-    let mode = match argument(3, "node").as_str() {
-        "node" => Mode::Node,
-        "face" => Mode::face(),
-        "exact" => Mode::exact(),
-        other => return Err(format!("{other}: expected node, face or exact").into()),
-    };
+    let mode = argument(3, "node").parse::<ModeName>()?.with(FaceOptions::default());
     let contact_distance = argument(5, "0.2").parse::<f64>()? * 1e-3;
     let reduction = match argument(4, "64").as_str() {
         "none" => Reduction::None,

@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let mesh = input.solid.mesh();
         let near = points::near_surface(mesh, args.points as usize, args.seed);
         for preset in &args.presets {
-            let (asset, seconds) = input.encode(&EncodeOptions::preset(preset))?;
+            let (asset, seconds) = input.encode(&EncodeOptions::preset(*preset))?;
             let found = inspect(&asset, &InspectOptions { samples: 1, seed: args.seed });
             let domain = points::in_domain(&asset, args.points as usize, args.seed);
             let reach = points::NEAR * mesh.diagonal();

@@ -171,7 +171,7 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
         build: a.encode_seconds + b.encode_seconds,
         poses,
     };
-    let contacts = |mode, contacts_per, reduction| {
+    let contacts = |mode: Mode, contacts_per, reduction| {
         measure(set, |poses, contact_distance| {
             let options = CollideOptions {
                 contact_distance,

@@ -2,7 +2,6 @@
 //! does the same in Python.
 use std::path::PathBuf;
 use std::time::Instant;
-use tesdf_cli::terminal::parse;
 
 use rayon::ThreadPoolBuilder;
 use serde_json::json;

@@ -45,7 +45,7 @@ impl Detect for VoxelDetector {
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
         options.validate()?;
         let refuse = |option, found: String, expected| Err(CollideError::Option { option, found, expected });
-        if options.mode == Mode::Exact {
+        if matches!(options.mode, Mode::Exact(_)) {
             return refuse("mode", "exact".into(), "node or face: a grid has no exact minimum");
         }
         if options.reduction != Reduction::None {

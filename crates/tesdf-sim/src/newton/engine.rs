@@ -53,7 +53,7 @@ struct Part {
 
 /// What came of an attempt to solve a part of a step.
 enum Made {
-    Part(Part),
+    Part(Box<Part>),
     /// Bodies have woken, or have bounced off each other: it is to be solved anew.
     Again,
     /// The part must end after this time, s, where bodies bounce off each other.
@@ -324,7 +324,7 @@ impl Newton {
         let mut report = step.report;
         let found = look.contacts;
         report.solution = begin.elapsed().saturating_sub(report.detection);
-        Ok(Made::Part(Part { states, found, passing, is_loose, forces, report }))
+        Ok(Made::Part(Box::new(Part { states, found, passing, is_loose, forces, report })))
     }
 
     /// Moves by a step, in as many parts as bodies that turn far, fast pairs and joints need.
@@ -347,7 +347,7 @@ impl Newton {
                     continue;
                 }
             };
-            let Part { states, found, passing, is_loose, forces: of_rows, report: mut of_part } = part;
+            let Part { states, found, passing, is_loose, forces: of_rows, report: mut of_part } = *part;
             let may_divide = report.divided < MOST_DIVISIONS;
             let half = is_loose.then_some(Passing { hit: None, pairs: 0 });
             let divides = passing.filter(|_| may_divide).or(half);

@@ -10,8 +10,9 @@ const ORDER: [&str; 16] = [
     "query", "verify", "encode", "deform", "collide", "inspect",
 ];
 /// The order of the folders and files of `collide`.
-const ORDER_OF_COLLIDE: [&str; 11] = [
+const ORDER_OF_COLLIDE: [&str; 12] = [
     "scene",
+    "mode",
     "options",
     "pairs",
     "report",
