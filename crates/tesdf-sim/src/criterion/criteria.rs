@@ -4,7 +4,7 @@ use std::sync::Arc;
 use serde_json::Value;
 use toml::de::ValueDeserializer;
 
-use super::section::Known;
+use super::any::AnyCriterion;
 use super::{
     Criterion, GearRatioCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion,
     SeparationCriterion,
@@ -18,8 +18,8 @@ pub struct Criteria(BTreeMap<&'static str, Reader>);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reader {
     pub(crate) name: &'static str,
-    pub(crate) toml: fn(ValueDeserializer<'_>) -> Result<Arc<dyn Known>, toml::de::Error>,
-    pub(crate) json: fn(Value) -> Result<Arc<dyn Known>, serde_json::Error>,
+    pub(crate) toml: fn(ValueDeserializer<'_>) -> Result<Arc<dyn AnyCriterion>, toml::de::Error>,
+    pub(crate) json: fn(Value) -> Result<Arc<dyn AnyCriterion>, serde_json::Error>,
 }
 
 impl Default for Criteria {

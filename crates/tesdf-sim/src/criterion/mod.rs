@@ -90,6 +90,7 @@
 //! assert!(summary.report::<HeightReport>().unwrap().height < 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+mod any;
 mod criteria;
 mod gear_ratio;
 mod insertion;
@@ -100,13 +101,14 @@ mod screw;
 mod section;
 mod separation;
 
+pub use any::CriterionReport;
 pub use criteria::Criteria;
 pub use gear_ratio::{GearRatioCriterion, GearRatioReport, GearRatioTracker};
 pub use insertion::{InsertionCriterion, InsertionReport, InsertionTracker};
 pub use lift::{LiftCriterion, LiftReport, LiftTracker};
 pub use rest::{RestCriterion, RestReport, RestTracker};
 pub use screw::{ScrewCriterion, ScrewReport, ScrewTracker, screw_acceleration};
-pub use section::{CriterionReport, CriterionSection};
+pub use section::CriterionSection;
 pub(crate) use section::{Trackers, by_name};
 pub use separation::{SeparationCriterion, SeparationReport, SeparationTracker};
 

@@ -1,25 +1,25 @@
 //! The criteria of a scene, whichever they are.
-use std::any::Any;
 use std::collections::BTreeMap;
-use std::fmt;
 use std::sync::Arc;
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
-use super::{Criteria, Criterion, Report, Rows, Tracker};
+use super::any::{AnyCriterion, AnyTracker, CriterionReport};
+use super::{Criteria, Criterion};
 use crate::System;
 
 /// The success criteria of a run, by the names of their tables. Every criterion that is given must
 /// hold.
 #[derive(Clone, Debug, Default)]
-pub struct CriterionSection(BTreeMap<&'static str, Arc<dyn Known>>);
+pub struct CriterionSection(BTreeMap<&'static str, Arc<dyn AnyCriterion>>);
 
 impl PartialEq for CriterionSection {
     /// Whether both have the same criteria with the same values.
     fn eq(&self, other: &Self) -> bool {
-        let values = |section: &Self| section.0.iter().map(|(name, known)| (*name, known.value())).collect();
+        let values =
+            |section: &Self| section.0.iter().map(|(name, criterion)| (*name, criterion.value())).collect();
         let [one, two]: [Vec<_>; 2] = [self, other].map(values);
         one == two
     }
@@ -27,7 +27,7 @@ impl PartialEq for CriterionSection {
 
 impl Serialize for CriterionSection {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, known)| (name, known.value())))
+        serializer.collect_map(self.0.iter().map(|(name, criterion)| (name, criterion.value())))
     }
 }
 
@@ -43,7 +43,7 @@ impl<'de> Deserialize<'de> for CriterionSection {
 impl CriterionSection {
     /// The criterion `C`, if the scene has it.
     pub fn get<C: Criterion>(&self) -> Option<&C> {
-        self.0.get(C::NAME).and_then(|known| known.as_any().downcast_ref())
+        self.0.get(C::NAME).and_then(|criterion| criterion.as_any().downcast_ref())
     }
 
     /// Gives the scene the criterion `C`, in place of the one that it may have.
@@ -81,7 +81,7 @@ impl CriterionSection {
     }
 
     /// Adds a criterion that was read.
-    pub(crate) fn insert(&mut self, name: &'static str, criterion: Arc<dyn Known>) {
+    pub(crate) fn insert(&mut self, name: &'static str, criterion: Arc<dyn AnyCriterion>) {
         self.0.insert(name, criterion);
     }
 
@@ -102,65 +102,9 @@ impl CriterionSection {
     }
 }
 
-/// A [`Criterion`] of any kind.
-pub(crate) trait Known: fmt::Debug + Send + Sync {
-    fn check(&self, system: &System) -> Result<Vec<String>, String>;
-    fn follow(&self, system: &System) -> Result<Box<dyn Followed>, String>;
-    fn value(&self) -> Value;
-    fn as_any(&self) -> &dyn Any;
-}
-
-impl<C: Criterion> Known for C {
-    fn check(&self, system: &System) -> Result<Vec<String>, String> {
-        Criterion::check(self, system)
-    }
-
-    fn follow(&self, system: &System) -> Result<Box<dyn Followed>, String> {
-        Ok(Box::new(self.track(system)?))
-    }
-
-    fn value(&self) -> Value {
-        // Only a map with other keys than texts has no JSON.
-        serde_json::to_value(self).unwrap_or_default()
-    }
-
-    fn as_any(&self) -> &dyn Any {
-        self
-    }
-}
-
-/// A [`Tracker`] of any kind.
-pub(crate) trait Followed: fmt::Debug + Send + Sync {
-    fn observe(&mut self, system: &System, time_step: f64);
-    fn report(&self, name: &'static str, system: &System, failures: &[String]) -> CriterionReport;
-    fn copy(&self) -> Box<dyn Followed>;
-}
-
-impl<T: Tracker> Followed for T {
-    fn observe(&mut self, system: &System, time_step: f64) {
-        Tracker::observe(self, system, time_step);
-    }
-
-    fn report(&self, name: &'static str, system: &System, failures: &[String]) -> CriterionReport {
-        let mut report = Tracker::report(self, system);
-        report.failures().extend_from_slice(failures);
-        CriterionReport {
-            name,
-            failures: report.failures().clone(),
-            rows: report.rows(),
-            values: serde_json::to_value(&report).unwrap_or_default(),
-            report: Arc::new(report),
-        }
-    }
-
-    fn copy(&self) -> Box<dyn Followed> {
-        Box::new(self.clone())
-    }
-}
-
 /// Follows the criteria of a scene along a run.
 #[derive(Debug)]
-pub(crate) struct Trackers(Vec<(&'static str, Box<dyn Followed>)>);
+pub(crate) struct Trackers(Vec<(&'static str, Box<dyn AnyTracker>)>);
 
 impl Clone for Trackers {
     fn clone(&self) -> Self {
@@ -183,39 +127,6 @@ impl Trackers {
     /// Compares the run so far with the criteria. `failures` are added to those of each criterion.
     pub(crate) fn report(&self, system: &System, failures: &[String]) -> Vec<CriterionReport> {
         self.0.iter().map(|(name, tracker)| tracker.report(name, system, failures)).collect()
-    }
-}
-
-/// Result of a criterion. As JSON it is the [report](Self::report).
-#[derive(Clone)]
-pub struct CriterionReport {
-    /// The name of the criterion.
-    pub name: &'static str,
-    /// The requirements that the run did not meet; empty when it passed.
-    pub failures: Vec<String>,
-    /// The measured values, as people read them.
-    pub rows: Rows,
-    values: Value,
-    report: Arc<dyn Any + Send + Sync>,
-}
-
-impl CriterionReport {
-    /// The result of the kind `R`, such as [`RestReport`](super::RestReport); `None` when it is of
-    /// another kind.
-    pub fn report<R: Report>(&self) -> Option<&R> {
-        self.report.downcast_ref()
-    }
-}
-
-impl fmt::Debug for CriterionReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.name, self.values)
-    }
-}
-
-impl PartialEq for CriterionReport {
-    fn eq(&self, other: &Self) -> bool {
-        (self.name, &self.values) == (other.name, &other.values)
     }
 }
 
