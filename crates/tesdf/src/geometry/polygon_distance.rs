@@ -11,7 +11,8 @@ use super::Triangle;
 /// nearest points: a corner and a face, two edges, an edge through a face.
 ///
 /// ```
-/// use tesdf::geometry::{Triangle, polygon_to_triangle};
+/// use tesdf::geometry::Triangle;
+/// use tesdf::geometry::internal::polygon_to_triangle;
 /// use tesdf::glam::DVec3;
 ///
 /// let t = Triangle::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
