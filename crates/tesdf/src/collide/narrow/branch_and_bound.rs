@@ -267,7 +267,9 @@ impl<'a> Branches<'a> {
                     let distances = |face| distances(&triangle(face));
                     let (least, at) = self.bound_by_faces(&mut cuts, points, distances);
                     bound = bound.max(least);
-                    if self.is_open(bound) {
+                    // Where the sign jumps, the side of a part is to be told, too: the shorter it is in
+                    // every direction, the sooner.
+                    if self.is_open(bound) && !self.jumps {
                         edge = cuts.curved_edge(asset, points, at, self.tolerance);
                     }
                 }
