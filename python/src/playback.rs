@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use tesdf::Progress;
 use tesdf::save::{Destination, SaveError, SaveOptions};
 use tesdf_playback::{ContactOptions, Frames, GlbOptions, Playback, glb, page};
-use tesdf_sim::scene_file::LoadedScene;
+use tesdf_sim::scene_file::{AssetCache, LoadedScene};
 use tesdf_sim::{RunRecord, System};
 
 use crate::errors::{Error, argument, kind_of};
@@ -129,6 +129,7 @@ impl Source {
                 return Err(Error::NoBody(path.to_path_buf(), body.clone()));
             }
         }
+        loaded.assets = AssetCache::of_user();
         let system = loaded.system_watched(progress).map_err(Error::Scene)?;
         let name = path.file_stem().map_or(String::new(), |name| name.to_string_lossy().into_owned());
         let mut inputs = loaded.geometry_files();

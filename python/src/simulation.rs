@@ -13,7 +13,7 @@ use tesdf::Progress;
 use tesdf::collide::Velocity;
 use tesdf::glam::DVec3;
 use tesdf_sim::newton::Newton;
-use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
+use tesdf_sim::scene_file::{AssetCache, DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{
     Drive, Dynamics, DynamicsError, Motor, PartialRun, Run, RunRecord, SimulateError, State, System, Wrench,
 };
@@ -83,6 +83,7 @@ impl Running {
     /// Reads the scene, encodes its meshes, and begins the run.
     fn begin(mut loaded: LoadedScene, device: Option<Device>, progress: &Progress) -> Result<Self, Error> {
         let scene_error = Error::Scene;
+        loaded.assets = AssetCache::of_user();
         let system = loaded.system_watched(progress).map_err(scene_error)?;
         // The run stores the scene's folder, so its meshes are found from any folder.
         loaded.path = std::path::absolute(&loaded.path)

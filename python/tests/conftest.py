@@ -1,3 +1,4 @@
+import os
 import sys
 from itertools import permutations
 from pathlib import Path
@@ -5,6 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tesdf
+
+# Tests encode their meshes.
+os.environ["TESDF_CACHE"] = ""
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 sys.path[:0] = [str(DATA), str(DATA / "reference")]

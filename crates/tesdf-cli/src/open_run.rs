@@ -8,7 +8,7 @@ use crate::terminal::report::Failure;
 use crate::terminal::run_file;
 use tesdf::Progress;
 use tesdf::save::Destination;
-use tesdf_sim::scene_file::{LoadedScene, SceneError};
+use tesdf_sim::scene_file::{AssetCache, LoadedScene, SceneError};
 use tesdf_sim::{RunRecord, System};
 
 use crate::simulate::replace_geometries;
@@ -44,6 +44,7 @@ pub fn open(
     inputs.push(run.to_path_buf());
     let output = output::open(output, &inputs, consent)?;
     let progress = Progress::default();
+    loaded.assets = AssetCache::of_user();
     let system =
         watched(&progress, interrupted, || loaded.system_watched(&progress)).map_err(|e| match e {
             SceneError::Body { name, reason, .. } => {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use tesdf::Progress;
 use tesdf_sim::criterion::Criteria;
 use tesdf_sim::record::RecordError;
-use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
+use tesdf_sim::scene_file::{AssetCache, DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
 use crate::collide::warn_of_coarse;
@@ -62,9 +62,21 @@ pub struct Args {
     /// energy from nowhere, steps that did not converge
     #[arg(long)]
     pub strict: bool,
+    /// Encode the meshes of the scene anew. Otherwise those that were encoded before come from the
+    /// user's folder for caches, or that of the environment variable TESDF_CACHE
+    #[arg(long)]
+    pub no_cache: bool,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Tells which meshes were encoded, and where they are kept.
+pub fn tell_encoded(assets: &AssetCache) {
+    let files: Vec<String> = assets.encoded().iter().map(|file| file.display().to_string()).collect();
+    if !files.is_empty() {
+        report::note(&format!("encoded {}; kept in {}", files.join(", "), assets.folder().display()));
+    }
 }
 
 /// Parses a body and its geometry as `BODY=FILE`.
@@ -127,6 +139,7 @@ pub fn run_with(
     let device = args.device.open()?;
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
+    loaded.assets = if args.no_cache { None } else { AssetCache::of_user() };
     let system = watched(&progress, &interrupted, || loaded.system_watched(&progress));
     let mut system = system.map_err(|e| match e {
         SceneError::Cancelled => {
@@ -134,6 +147,9 @@ pub fn run_with(
         }
         e => Failure::new(e),
     })?;
+    if let Some(assets) = &loaded.assets {
+        tell_encoded(assets);
+    }
     let device_name = device.as_ref().map_or("cpu", Device::name);
     let origin = RunOrigin::of(&system, device_name).map_err(Failure::new)?;
     let begun = begin(args, &loaded, earlier.as_ref(), &mut system, &origin)?;

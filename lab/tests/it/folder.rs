@@ -30,7 +30,7 @@ impl Folder {
     /// Runs the binary. Returns its exit code, stdout and stderr.
     pub fn lab(&self, args: &[&str]) -> (Option<i32>, String, String) {
         let binary = env!("CARGO_BIN_EXE_tesdf-lab");
-        let out = Command::new(binary).args(args).current_dir(self.0.path()).output().unwrap();
+        let out = Command::new(binary).env("TESDF_CACHE", "").args(args).current_dir(self.0.path()).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
         (out.status.code(), text(out.stdout), text(out.stderr))
     }

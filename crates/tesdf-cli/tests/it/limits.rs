@@ -25,6 +25,7 @@ translation = [0, 0, 0.011]
 fn within(kilobytes: u32, folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
     let script = format!("ulimit -v {kilobytes}; exec \"$0\" \"$@\"");
     let mut shell = Command::new("sh");
+    shell.env("TESDF_CACHE", "");
     shell.args(["-c", &script, crate::folder::BINARY]).args(args).current_dir(folder.path(""));
     texts(shell.output().unwrap())
 }

@@ -1,4 +1,5 @@
 //! The tests of `tesdf-cli` over several of its modules, in one program.
+mod asset_cache;
 mod bad_input;
 mod check_and_repair;
 mod clearance_and_toi;

@@ -139,8 +139,11 @@ fn stdout_carries_the_output_and_nothing_else() {
     // The shell's file must not be replaced, and must not be written from its beginning.
     let script = "{ echo before; \"$0\" repair cube.obj -o /dev/stdout; echo after; } >>all 2>/dev/null";
     folder.write("all", "first\n");
-    let shell =
-        Command::new("sh").args(["-c", script, crate::folder::BINARY]).current_dir(folder.path("")).status();
+    let shell = Command::new("sh")
+        .env("TESDF_CACHE", "")
+        .args(["-c", script, crate::folder::BINARY])
+        .current_dir(folder.path(""))
+        .status();
     assert!(shell.unwrap().success());
     let expected = [b"first\nbefore\n", &fs::read(folder.path("out.ply")).unwrap()[..], b"after\n"].concat();
     assert_eq!(fs::read(folder.path("all")).unwrap(), expected);
@@ -208,6 +211,7 @@ fn as_a_user(folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
         }
         fs::set_permissions(folder.path(""), fs::Permissions::from_mode(0o755)).unwrap();
         command = Command::new(binary);
+        command.env("TESDF_CACHE", "");
         command.args(args).current_dir(folder.path("")).uid(65_534).gid(65_534);
     }
     texts(command.output().unwrap())
@@ -272,6 +276,7 @@ impl FullDisk {
         match self {
             Self::Limit => {
                 let mut shell = Command::new("sh");
+                shell.env("TESDF_CACHE", "");
                 shell.args(["-c", script, crate::folder::BINARY]).args(args).current_dir(folder.path(""));
                 texts(shell.output().unwrap())
             }
@@ -340,6 +345,7 @@ fn a_closed_or_full_stdout_keeps_the_output_file() {
     let run = |redirection: &str, output: &str| {
         let script = format!("\"$0\" encode cube.obj --preset fast -o {output} {redirection}");
         let mut shell = Command::new("bash");
+        shell.env("TESDF_CACHE", "");
         texts(
             shell.args(["-c", &script, crate::folder::BINARY]).current_dir(folder.path("")).output().unwrap(),
         )

@@ -207,7 +207,13 @@ impl Shapes {
                 let opened = match body.asset {
                     Some(_) => TeSdf::open(&file)
                         .map_err(|e| ShapeFailure::Reason(format!("{}: {e}", file.display())))?,
-                    None => encode_mesh(&file, inside, repair, progress)?,
+                    None => {
+                        let encode = || encode_mesh(&file, inside, repair, progress);
+                        match &scene.assets {
+                            Some(assets) => assets.get(&file, inside, repair, encode)?,
+                            None => encode()?,
+                        }
+                    }
                 };
                 let shape = add_shape(system, Shape::Mesh(Arc::new(opened)))?;
                 self.0.insert(key, shape);

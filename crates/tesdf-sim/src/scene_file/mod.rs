@@ -51,6 +51,7 @@
 //! one unit of its mesh, m. If the assets record different units, their scales must agree with
 //! these units, or loading fails.
 
+mod asset_cache;
 mod build;
 mod connect;
 mod copies;
@@ -67,6 +68,7 @@ use tesdf::base::{Named as _, SurfaceFaces};
 use tesdf::collide::{CollideError, CollideOptions, ContactsPer, FaceOptions, Mode, ModeChoices, ModeName};
 use toml::Spanned;
 
+pub use asset_cache::AssetCache;
 pub use copies::CopiesSection;
 pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};

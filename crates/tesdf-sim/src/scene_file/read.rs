@@ -5,6 +5,7 @@ use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
+use super::asset_cache::AssetCache;
 use super::copies::expand;
 use super::{BodySection, MAX_BODIES, SceneError, SceneFile};
 use crate::RunRecord;
@@ -20,6 +21,8 @@ pub struct LoadedScene {
     pub scene: SceneFile,
     /// The path of the file.
     pub path: PathBuf,
+    /// Where encoded meshes are kept; `None`, as it is read: nowhere.
+    pub assets: Option<AssetCache>,
     /// Empty when the scene comes from JSON.
     pub(super) text: String,
 }
@@ -81,7 +84,7 @@ impl LoadedScene {
             })?;
             scene.criterion.insert(reader.name, (reader.toml)(table.into()).map_err(refuse)?);
         }
-        Self { scene, path, text }.with_copies()
+        Self { scene, path, assets: None, text }.with_copies()
     }
 
     /// The scene with each copy of a body as a body of its own.

@@ -33,6 +33,7 @@ impl Folder {
 
     pub fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(BINARY);
+        command.env("TESDF_CACHE", "");
         command.args(args).current_dir(self.0.path());
         command
     }
