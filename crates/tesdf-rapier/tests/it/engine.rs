@@ -280,14 +280,14 @@ fn damping_slows_a_rotation() {
 }
 
 #[test]
-fn kinematic_bodies_move_and_joints_are_refused() {
+fn kinematic_bodies_move_and_joints_and_restitution_are_refused() {
     let ball = Shape::Sphere { radius: 0.01 };
     let mut system = System::new(GRAVITY);
     let body = add(&mut system, "wrist", ball.clone(), Pose::at(DVec3::ZERO), Mass::Kinematic);
     let other = add(&mut system, "ball", ball.clone(), Pose::at(DVec3::X), Mass::Free(steel(&ball)));
     let state = State { linear: DVec3::Y, ..State::at_rest(Pose::at(DVec3::ZERO)) };
     system.set_state(body, state).expect("a state");
-    let mut jointed = system.clone();
+    let [mut jointed, mut bouncing] = [system.clone(), system.clone()];
     let mut engine = engine(system, collide(Mode::exact()));
     for _ in 0..100 {
         engine.step(1e-3).expect("a step");
@@ -296,7 +296,10 @@ fn kinematic_bodies_move_and_joints_are_refused() {
     assert!(pose.translation.distance(0.1 * DVec3::Y) < 1e-9, "{pose:?}");
     let weld = Joint::new("weld", JointKind::Weld, (Some(body), other), [pose; 2], pose);
     jointed.add_joint(weld).expect("a joint");
-    let error = RapierEngine::new(jointed, collide(Mode::exact()), RapierOptions::default()).err();
-    let message = error.expect("a refusal").to_string();
-    assert_eq!(message, "Rapier does not simulate joints; use the built-in engine");
+    bouncing.set_restitution(other, 0.5).expect("a coefficient");
+    for (system, what) in [(jointed, "joints"), (bouncing, "restitution")] {
+        let error = RapierEngine::new(system, collide(Mode::exact()), RapierOptions::default()).err();
+        let message = error.expect("a refusal").to_string();
+        assert_eq!(message, format!("Rapier does not simulate {what}; use the built-in engine"));
+    }
 }
