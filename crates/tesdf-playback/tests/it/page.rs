@@ -9,7 +9,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use flate2::read::ZlibDecoder;
 use serde_json::Value;
-use tesdf::collide::{CollideError, CollideOptions, Mode, detect};
+use tesdf::collide::{CollideError, CollideOptions, ContactsPer, Mode, detect};
 use tesdf::glam::{DVec3, Vec3};
 use tesdf_playback::{ContactOptions, FrameContacts, Frames, Playback, PlaybackError, page};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
@@ -125,7 +125,7 @@ fn recorded_contacts_and_those_detected_again_agree() {
     let (record, system, loaded) = simulated();
     let playback = Playback::new(&record, &system, Frames::default()).unwrap();
     let detection = loaded.detection(&system).unwrap();
-    assert_eq!((detection.mode, detection.contact_distance), (Mode::exact(), 1e-3));
+    assert_eq!((detection.mode, detection.contact_distance), (Mode::exact().per(ContactsPer::Minimum), 1e-3));
     let found = contacts(&playback, &system, detection);
     // The same states without contacts.
     let mut empty = RunRecord::new(&system, record.scene.clone());
