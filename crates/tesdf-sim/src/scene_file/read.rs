@@ -164,7 +164,8 @@ impl LoadedScene {
         let bodies = bodies.into_iter().enumerate().map(read).collect::<Result<_, SceneError>>()?;
         json["bodies"] = Value::Array(Vec::new());
         let scene: SceneFile = serde_json::from_value(json).map_err(|e| refuse(e.to_string()))?;
-        Self { scene: SceneFile { bodies, criterion, ..scene }, path, text: String::new() }.with_copies()
+        let scene = SceneFile { bodies, criterion, ..scene };
+        Self { scene, path, assets: None, text: String::new() }.with_copies()
     }
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
