@@ -37,11 +37,11 @@ impl Keywords {
             let options = &mut found.options;
             match name.as_str() {
                 "mode" => choices.mode = Some(named(&name, &value)?),
-                "contacts_per" => choices.contacts_per = Some(named(&name, &value)?),
+                "contacts_per" => choices.contacts_per = optional(&name, &value, named)?,
                 "contact_distance" => options.contact_distance = number(&name, &value)?,
                 "speculative_time" => options.speculative_time = number(&name, &value)?,
                 "cos_theta" => choices.cos_theta = optional(&name, &value, number)?,
-                "iterations" => choices.iterations = Some(count(&name, &value)?),
+                "iterations" => choices.iterations = optional(&name, &value, count)?,
                 "tolerance" => {
                     choices.tolerance = optional(&name, &value, number)?.map(Length::Absolute);
                 }

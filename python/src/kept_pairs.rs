@@ -38,7 +38,7 @@ impl InstancePairs {
     ///
     /// moved: ids [N] of the instances that have changed since the last call. Other instances are
     /// then not looked at, so leaving one out misses its contacts. None looks at all.
-    #[pyo3(signature = (scene, *, moved = None, **options), text_signature = "($self, scene, *, moved=None, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
+    #[pyo3(signature = (scene, *, moved = None, **options), text_signature = "($self, scene, *, moved=None, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=None, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn detect<'py>(
         &self,
         scene: &Bound<'py, Scene>,

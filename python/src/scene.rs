@@ -277,7 +277,7 @@ impl Scene {
     /// - speculative_time: adds to the contact distance what the velocities close within this time.
     /// - cos_theta: in the modes "face" and "exact" only, drops a contact when the cosine between
     ///   the gradient and the face's normal is above -cos_theta. None keeps all.
-    /// - iterations: number of Frank-Wolfe iterations in the mode "face" only.
+    /// - iterations: number of Frank-Wolfe iterations in the mode "face" only; None is 16.
     /// - tolerance: largest error in the modes "face" and "exact" only, in the world's unit. None is 1e-7 of the
     ///   diagonal of b.
     /// - reduce, spread: at most this many contacts for each pair of instances; only one of them.
@@ -289,7 +289,7 @@ impl Scene {
     ///   device or a part of its name, such as "cuda:0"; devices lists them. A device computes in
     ///   f32; docs/gpu/design.md says how far its contacts agree with the processor's. It keeps
     ///   the shapes until a detection on another device. Ctrl-C acts after the detection.
-    #[pyo3(signature = (*, device = None, **options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None, device='cpu')")]
+    #[pyo3(signature = (*, device = None, **options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=None, tolerance=None, reduce=None, spread=None, precision='f64', threads=None, device='cpu')")]
     fn detect<'py>(
         &self,
         py: Python<'py>,
@@ -326,7 +326,7 @@ impl Scene {
     /// - The other options are those of detect, with the same defaults. A device cannot leave all
     ///   contacts per face there: give reduce or spread, contacts_per="cell" or mode="node".
     ///   Without, and with contacts_per="minimum", a DeviceError is raised.
-    #[pyo3(signature = (*, poses = None, velocities = None, device = None, **options), text_signature = "($self, *, poses=None, velocities=None, device=None, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
+    #[pyo3(signature = (*, poses = None, velocities = None, device = None, **options), text_signature = "($self, *, poses=None, velocities=None, device=None, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=None, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn detect_on_device<'py>(
         &self,
         py: Python<'py>,
@@ -351,7 +351,7 @@ impl Scene {
     /// instances: there, the mode "node" can miss where they touch. Returns
     /// CoarseContacts(instance_a, instance_b, face_a, corner_reach, distance). Options are those of
     /// detect; mode, contacts_per, cos_theta and the reductions are not used.
-    #[pyo3(signature = (**options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
+    #[pyo3(signature = (**options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=None, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn coarse_contacts<'py>(
         &self,
         py: Python<'py>,
@@ -503,7 +503,7 @@ impl Scene {
     ///
     /// part: the face or vertex of a (as face_a or feature_a of a contact). None reports all
     /// candidates. The options are those of detect; the report is that before a reduction.
-    #[pyo3(signature = (a, b, part = None, **options), text_signature = "($self, a, b, part=None, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
+    #[pyo3(signature = (a, b, part = None, **options), text_signature = "($self, a, b, part=None, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=None, tolerance=None, reduce=None, spread=None, precision='f64', threads=None)")]
     fn why<'py>(
         &self,
         py: Python<'py>,
