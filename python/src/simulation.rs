@@ -345,13 +345,15 @@ impl Simulation {
     /// The forces of the contacts that push, each the mean over the last step: ContactForces.
     #[getter]
     fn contact_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        forces::of_contacts(py, &self.read(py, |r| r.engine.forces().cloned()).unwrap_or_default().contacts)
+        let forces = self.read(py, |r| r.engine.forces().map(|forces| forces.contacts.clone()));
+        forces::of_contacts(py, &forces.unwrap_or_default())
     }
 
     /// What each joint did to its child, as the mean over the last step: JointForces.
     #[getter]
     fn joint_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        forces::of_joints(py, &self.read(py, |r| r.engine.forces().cloned()).unwrap_or_default().joints)
+        let forces = self.read(py, |r| r.engine.forces().map(|forces| forces.joints.clone()));
+        forces::of_joints(py, &forces.unwrap_or_default())
     }
 
     /// Sets the motor of a joint, given by its name or number, from the next step on. It drives one

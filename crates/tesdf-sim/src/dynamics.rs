@@ -137,6 +137,11 @@ impl Verdict {
 }
 
 impl StepReport {
+    /// Before the first solve.
+    pub(crate) fn begun() -> Self {
+        Self { converged: true, ..Self::default() }
+    }
+
     /// How well the solves so far came out.
     pub(crate) fn verdict(&self) -> Verdict {
         Verdict { converged: self.converged, residual: self.residual }

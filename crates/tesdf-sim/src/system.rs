@@ -197,6 +197,9 @@ impl System {
 
     /// The rate of the coordinate of a joint at `states`.
     pub(crate) fn rate_of(&self, joint: &Joint, states: &[State]) -> f64 {
+        if matches!(joint.kind, JointKind::Weld | JointKind::Ball) {
+            return 0.0;
+        }
         let [parent, child] = joint.frames_in_world(Self::poses_of(joint, states));
         let axis = parent.rotation * DVec3::Z;
         // Of a body's point that is at the origin of the child's frame now.
@@ -224,26 +227,33 @@ impl System {
     /// # Errors
     /// As [`set_states`](Self::set_states).
     pub(crate) fn follow(&mut self, states: Vec<State>, time: f64) -> Result<(), DynamicsError> {
-        let turned = self.joints.iter().zip(&self.coordinates).map(|(joint, &before)| {
+        let turned = self.joints.iter().zip(&self.coordinates).map(|(joint, before)| {
             let rates = self.rate_of(joint, &self.states) + self.rate_of(joint, &states);
             before + 0.5 * time * rates
         });
         let turned: Vec<f64> = turned.collect();
-        self.set_states(states)?;
-        self.count_turns(&turned);
+        self.replace_states(states, turned)
+    }
+
+    /// Replaces all states, at which the angles of hinges are near `turned`.
+    fn replace_states(&mut self, states: Vec<State>, turned: Vec<f64>) -> Result<(), DynamicsError> {
+        if states.len() != self.bodies.len() {
+            return Err(DynamicsError::States { found: states.len(), expected: self.bodies.len() });
+        }
+        states.iter().enumerate().try_for_each(|(body, state)| self.check(body, state))?;
+        self.states = states;
+        let coordinates = self.joints.iter().zip(turned).map(|(joint, near)| self.coordinate(joint, near));
+        self.coordinates = coordinates.collect();
         Ok(())
     }
 
-    /// The coordinates at the current states, of hinges those nearest to `expected`.
-    fn count_turns(&mut self, expected: &[f64]) {
-        let coordinates = self.joints.iter().zip(expected).map(|(joint, expected)| {
-            let coordinate = joint.coordinate(Self::poses_of(joint, &self.states));
-            match joint.kind {
-                JointKind::Hinge => expected + wrapped(coordinate - expected),
-                JointKind::Slider | JointKind::Weld | JointKind::Ball => coordinate,
-            }
-        });
-        self.coordinates = coordinates.collect();
+    /// The coordinate of a joint now; of a hinge the one of all turns that is nearest to `near`.
+    fn coordinate(&self, joint: &Joint, near: f64) -> f64 {
+        let coordinate = joint.coordinate(Self::poses_of(joint, &self.states));
+        match joint.kind {
+            JointKind::Hinge => near + wrapped(coordinate - near),
+            JointKind::Slider | JointKind::Weld | JointKind::Ball => coordinate,
+        }
     }
 
     /// Replaces the motor of a joint.
@@ -407,7 +417,11 @@ impl System {
         self.check(body, &state)?;
         let pose = Pose::new(state.pose.translation, state.pose.rotation)?;
         self.states[body] = State { pose, ..state };
-        self.count_turns(&self.coordinates.clone());
+        for (k, joint) in self.joints.iter().enumerate() {
+            if joint.child == body || joint.parent == Some(body) {
+                self.coordinates[k] = self.coordinate(joint, self.coordinates[k]);
+            }
+        }
         Ok(())
     }
 
@@ -418,13 +432,7 @@ impl System {
     /// [`DynamicsError::NotFinite`], or [`DynamicsError::States`] when the number of states differs
     /// from the number of bodies.
     pub fn set_states(&mut self, states: Vec<State>) -> Result<(), DynamicsError> {
-        if states.len() != self.bodies.len() {
-            return Err(DynamicsError::States { found: states.len(), expected: self.bodies.len() });
-        }
-        states.iter().enumerate().try_for_each(|(body, state)| self.check(body, state))?;
-        self.states = states;
-        self.count_turns(&self.coordinates.clone());
-        Ok(())
+        self.replace_states(states, self.coordinates.clone())
     }
 
     fn check(&self, body: usize, state: &State) -> Result<(), DynamicsError> {

@@ -35,6 +35,9 @@ const SLOW: f64 = 1e-3;
 /// Bodies that meet within this share of a step touch now.
 const AT_ONCE: f64 = 1.0 / 16.0;
 
+/// Maximum number of impacts, and of parts that end at one, in a step. What meets after them stops.
+const MOST: u32 = 64;
+
 /// Maximum number of rounds of an impact. A row of balls needs one for each.
 const ROUNDS: u32 = 64;
 
@@ -55,8 +58,7 @@ pub struct Bounces {
 impl Bounces {
     /// In a step of a system with this many joints.
     pub fn new(joints: usize) -> Self {
-        let report = StepReport { converged: true, ..StepReport::default() };
-        Self { left: 64, forces: Forces::none(joints), report }
+        Self { left: MOST, forces: Forces::none(joints), report: StepReport::begun() }
     }
 }
 
@@ -106,8 +108,8 @@ impl Newton {
             Place { found, row, restitution }
         });
         let places: Vec<Place<'_>> = places.collect();
-        // Bodies move by the velocities at the ends of steps: where they are, they are slower by half of
-        // what gravity gives in a step. With that, a ball that does not lose energy keeps its height.
+        // Bodies move by the velocities at the ends of steps: where they are, these lack half of what
+        // gravity gives in a step. With it, a ball of restitution 1 comes back to its height.
         let lag = pack(0.5 * step.whole * self.system.gravity, DVec3::ZERO);
         let now = |free: &FreeBody| velocity(&self.system.states()[free.body]) + lag;
         let start: Vec<_> = step.free.iter().map(now).collect();

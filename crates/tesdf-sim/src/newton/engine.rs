@@ -119,7 +119,7 @@ impl Newton {
             }
         }
         let poses = states.iter().map(|state| state.pose).collect();
-        let report = StepReport { converged: true, ..StepReport::default() };
+        let report = StepReport::begun();
         let [deep, resting] = [(); 2].map(|()| vec![false; free.len()]);
         Step { h, whole, poses, free, free_of, target, rotations, deep, resting, report }
     }

@@ -9,8 +9,7 @@ use tesdf::collide::Pose;
 
 use super::integrate::pack;
 use super::rows::{Bodies, PUSHES, Resistance, Row, RowId, Stiffness};
-use crate::joint::JointResistance;
-use crate::joint::{axes, rotation_between, swing, wrapped};
+use crate::joint::{JointResistance, axes, rotation_between, swing, wrapped};
 use crate::{Drive, Joint, JointKind, Mass, System};
 
 /// A direction in which a joint measures an error: of the translation at a point, or of the
@@ -20,6 +19,9 @@ enum Direction {
     Along(DVec3),
     About(DVec3),
 }
+
+/// Of a row that holds in both directions, whatever it takes.
+const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// A row of a joint, before its bodies are known.
 #[derive(Clone, Copy, Debug)]
@@ -44,39 +46,33 @@ enum Error {
 
 /// The rows of all joints at the poses of the beginning of the step.
 pub fn joint_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
+    rows(bodies, h, |measure| measure)
+}
+
+/// The same for an impact, which takes no time: what must hold, whatever it takes, stops to move, and
+/// all else, such as limits, springs and motors of limited force, does nothing.
+pub fn impact_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
+    rows(bodies, h, |measure| match measure {
+        Measure { error: Error::Position(_), bounds: FREE, .. } => {
+            Measure { error: Error::Position(0.0), ..measure }
+        }
+        _ => Measure { bounds: [0.0; 2], ..measure },
+    })
+}
+
+fn rows(bodies: &Bodies<'_>, h: f64, change: impl Fn(Measure) -> Measure) -> Vec<Row> {
     let of_joint = |joint: &Joint| {
-        let poses = System::poses_of(joint, bodies.system.states());
+        let states = bodies.system.states();
+        let poses = System::poses_of(joint, states);
         let point = joint.frames_in_world(poses)[1].translation;
-        let row = |measure: Measure| row(joint, measure, point, bodies, h);
-        measures(joint, poses, bodies.system.rate_of(joint, bodies.system.states()), h)
+        let row = |measure: Measure| row(joint, change(measure), point, bodies, h);
+        measures(joint, poses, bodies.system.rate_of(joint, states), h)
             .into_iter()
             .map(row)
             .collect::<Vec<_>>()
     };
     let rows = bodies.system.joints().iter().flat_map(of_joint);
     rows.enumerate().map(|(k, row)| Row { id: RowId::Joint(k), ..row }).collect()
-}
-
-/// The same for an impact, which takes no time: what must hold stops to move, and all else, such as
-/// limits, motors and springs, does nothing.
-pub fn impact_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
-    let mut rows = joint_rows(bodies, h);
-    let mut k = 0;
-    for joint in bodies.system.joints() {
-        let poses = System::poses_of(joint, bodies.system.states());
-        for measure in measures(joint, poses, 0.0, h) {
-            let row = &mut rows[k];
-            match measure {
-                Measure { error: Error::Position(error), bounds: [low, high], .. } if low == -high => {
-                    row.gap -= error
-                }
-                _ => row.bounds = [0.0; 2],
-            }
-            row.relaxed_gap = row.gap;
-            k += 1;
-        }
-    }
-    rows
 }
 
 /// Sets the gaps of `rows`, which are those of all joints, to the errors at the poses that
@@ -118,11 +114,10 @@ fn measures(joint: &Joint, poses: [Pose; 2], before: f64, h: f64) -> Vec<Measure
     let [a, b] = joint.frames_in_world(poses);
     let [x, y, z] = axes(a);
     let (way, turn) = (b.translation - a.translation, rotation_between(a, b));
-    let free = [f64::NEG_INFINITY, f64::INFINITY];
     let rigid = |direction, error| Measure {
         direction,
         error: Error::Position(error),
-        bounds: free,
+        bounds: FREE,
         stiffness: None,
         resistance: Resistance::Rigid,
     };
@@ -156,14 +151,14 @@ fn measures(joint: &Joint, poses: [Pose; 2], before: f64, h: f64) -> Vec<Measure
         Measure { direction: axis, error, bounds, stiffness, resistance }
     };
     if damping > 0.0 {
-        found.push(resists(0.0, free, Some(damping / h), Resistance::Spring));
+        found.push(resists(0.0, FREE, Some(damping / h), Resistance::Spring));
     }
     if friction > 0.0 {
         found.push(resists(0.0, [-friction, friction], None, Resistance::Rigid));
     }
     if armature > 0.0 {
-        // Its force a (q̇₀ − q̇) / h is that of a damper which aims at the rate at the beginning.
-        found.push(resists(before, free, Some(armature / (h * h)), Resistance::Spring));
+        // Its force a (q̇₀ − q̇) / h is that of a damper that aims at the rate at the beginning.
+        found.push(resists(before, FREE, Some(armature / (h * h)), Resistance::Spring));
     }
     if let Some(motor) = joint.motor {
         let limit = [-motor.limit, motor.limit];
@@ -178,8 +173,8 @@ fn measures(joint: &Joint, poses: [Pose; 2], before: f64, h: f64) -> Vec<Measure
                 let force = force.clamp(-motor.limit, motor.limit);
                 (Error::Rate(0.0), [force; 2], None, Resistance::Rigid)
             }
-            // k (x + h ẋ) + d (ẋ − u) − f = (k h + d) (ẋ + (k x − d u − f) / (k h + d)), at the end of the
-            // step.
+            // k (x + h ẋ) + d (ẋ − u) − f = (k h + d) (ẋ + (k x − d u − f) / (k h + d)), at the end
+            // of the step.
             Drive::Spring { rest, stiffness: k, damping: d, velocity, force } => {
                 let rate = (d * velocity + force - k * from(rest)) / (k * h + d);
                 (Error::Rate(rate), limit, Some(k + d / h), Resistance::Spring)

@@ -189,18 +189,20 @@ impl Newton {
         let of_joints = rows.len() - joints.len();
         let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
         self.close_joints(step, &mut solved, of_joints, &from);
-        let Iterate { rows, velocities, forces, .. } = &solved;
-        let (carried, carrying) = match rows.iter().any(|row| row.relaxed_gap != row.gap) {
-            true => self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)),
-            false => (velocities.clone(), forces.clone()),
-        };
-        if far.closes(velocities, step.h) || far.closes(&carried, step.h) {
+        let Iterate { rows, velocities, forces, plain, .. } = &solved;
+        let relaxed = rows
+            .iter()
+            .any(|row| row.relaxed_gap != row.gap)
+            .then(|| self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)));
+        // Without corrections of poses, both are the same.
+        let (carried, carrying) = relaxed.as_ref().map_or((velocities, forces), |(v, f)| (v, f));
+        if far.closes(velocities, step.h) || far.closes(carried, step.h) {
             return Ok(None);
         }
-        let Iterate { rows, velocities, forces, plain, .. } = solved;
-        let reactions = self.reactions(&rows, &carrying, of_joints);
+        let reactions = self.reactions(rows, carrying, of_joints);
+        let carried = step.ended(plain, velocities, carried);
+        let Iterate { rows, velocities, forces, .. } = solved;
         self.kept.keep(&rows, forces);
-        let carried = step.ended(&plain, &velocities, &carried);
         Ok(Some(Solved { velocities, carried, forces: reactions }))
     }
 

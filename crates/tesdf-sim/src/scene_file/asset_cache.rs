@@ -12,9 +12,9 @@ use tesdf::mesh::{LoadedMesh, RepairMode, read};
 /// Part of the keys: it is raised when the encoder makes other bytes of the same mesh.
 const ENCODER: u32 = 1;
 
-/// A folder of encoded meshes. Their names are hashes of the mesh file, of its mesh, of the options and
-/// of the version of this program. Several programs may use it at once, and any file in it may be
-/// removed at any time; one whose checksums are wrong is made anew.
+/// A folder of encoded meshes. Their names are hashes of the mesh file, of its mesh, of the options
+/// and of the version of this program. Several programs may use it at once, and any file in it may
+/// be removed at any time; one whose checksums are wrong is made anew.
 #[derive(Clone, Debug)]
 pub struct AssetCache {
     folder: PathBuf,
@@ -55,8 +55,8 @@ impl AssetCache {
         self.encoded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The asset of a mesh file: that of the cache, or what `encode` makes, which is kept. A cache that
-    /// cannot be read or written costs the time of encoding, and nothing else.
+    /// The asset of a mesh file: that of the cache, or what `encode` makes, which is kept. A cache
+    /// that cannot be read or written costs the time of encoding, and nothing else.
     ///
     /// # Errors
     /// Those of `encode`.

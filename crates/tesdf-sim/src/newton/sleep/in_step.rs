@@ -15,7 +15,7 @@ impl Newton {
 
     /// Before a step: which bodies are still in it, and their contacts with each other.
     pub(in crate::newton) fn begin_sleep(&mut self, whole: f64) -> Result<StepReport, DynamicsError> {
-        let mut report = StepReport { converged: true, ..StepReport::default() };
+        let mut report = StepReport::begun();
         if !self.sleeps() {
             return Ok(report);
         }
