@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use pyo3::prelude::*;
 use tesdf::Progress;
 use tesdf::save::{Destination, SaveError, SaveOptions};
-use tesdf_playback::{ContactOptions, Frames, GlbOptions, Playback, glb, page};
+use tesdf_playback::{Arrows, ContactOptions, Frames, GlbOptions, Playback, glb, page};
 use tesdf_sim::scene_file::{AssetCache, LoadedScene};
 use tesdf_sim::{RunRecord, System};
 
@@ -90,11 +90,14 @@ pub fn view(
     write(py, run, geometries, &path, |source, stop| {
         let Source { record, system, loaded, name, .. } = source;
         let run = Playback::new(record, system, frames).map_err(Error::Playback)?;
-        let detection = loaded.detection(system).filter(|_| contacts > 0);
-        let options = ContactOptions { detection, most: contacts };
+        let most = contacts;
+        let detection = loaded.detection(system).filter(|_| most > 0);
+        let options = ContactOptions { detection, most };
+        let forces = if most > 0 { run.forces(most) } else { None };
         let contacts = run.contacts(system, &options, stop, |_| {}).map_err(Error::Playback)?;
         let title = title.as_deref().unwrap_or(name);
-        Ok(page(&run, contacts.as_deref(), title).map_err(Error::Playback)?.into_bytes())
+        let arrows = Arrows { contacts: contacts.as_deref(), forces: forces.as_deref() };
+        Ok(page(&run, arrows, title).map_err(Error::Playback)?.into_bytes())
     })
 }
 

@@ -269,7 +269,7 @@ impl Simulation {
         saved.map_err(|e| Error::Record(path, e).raise(py))
     }
 
-    /// All states so far, recorded contacts and warnings: Record(times, poses, velocities, ...),
+    /// All states so far, recorded contacts, forces and warnings: Record(times, poses, velocities, ...),
     /// copied.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let record = self.read(py, |r| r.run.clone().into_record(r.engine.system()));
@@ -284,6 +284,10 @@ impl Simulation {
         let contacts: Vec<_> = record.contacts().collect();
         let all = || contacts.iter().flat_map(|(_, of_step)| of_step);
         let of_row = contacts.iter().flat_map(|(step, of_step)| of_step.iter().map(move |_| *step));
+        let forces: Vec<_> = record.forces().collect();
+        let of_force = forces.iter().flat_map(|(step, f)| f.contacts.iter().map(move |_| *step));
+        let pushing: Vec<_> = forces.iter().flat_map(|(_, f)| f.contacts.iter().copied()).collect();
+        let joints: Vec<_> = forces.iter().flat_map(|(_, f)| f.joints.iter().copied()).collect();
         Columns::new(py)
             .add("times", record.times().iter().copied())?
             .with("poses", shaped(poses.collect(), 7)?.into_any())?
@@ -295,6 +299,10 @@ impl Simulation {
             .add("distances", all().map(|c| c.distance))?
             .add_rows("bodies", all().map(|c| c.bodies))?
             .add_rows("faces", all().map(|c| c.faces))?
+            .add("force_steps", forces.iter().map(|(step, _)| *step))?
+            .add("contact_force_steps", of_force)?
+            .with("contact_forces", forces::of_contacts(py, &pushing)?)?
+            .with("joint_forces", forces::of_joints(py, &joints)?)?
             .with("warnings", classes::dict(py, &record.warnings())?)?
             .build("Record")
     }

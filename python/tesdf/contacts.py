@@ -367,5 +367,13 @@ class Record(_Rows):
     """[R, 2] the body of the face, and the body of the field"""
     faces: _Id
     """[R, 2] face of a, and face of b"""
+    force_steps: npt.NDArray[np.uint64]
+    """[Q] the steps whose forces are recorded (`forces_every`)"""
+    contact_force_steps: npt.NDArray[np.uint64]
+    """[F] the step of each contact force"""
+    contact_forces: ContactForces
+    """F forces between bodies"""
+    joint_forces: JointForces
+    """Q · J forces of joints, those of a step together"""
     warnings: list[dict[str, Any]]
     """what the steps did not do as the scene asks, as `warnings` of `summary()`"""

@@ -6,7 +6,7 @@ use crate::terminal::output::{self, Consent};
 use crate::terminal::progress::{Bar, interrupt_flag};
 use crate::terminal::report::{self, Failure, Outcome};
 use tesdf::collide::CollideError;
-use tesdf_playback::{ContactOptions, FrameContacts, Playback, PlaybackError, page};
+use tesdf_playback::{Arrows, ContactOptions, FrameContacts, Playback, PlaybackError, page};
 
 use crate::export::FrameArgs;
 use crate::open_run::{self, OpenRun};
@@ -25,8 +25,9 @@ pub struct Args {
     /// Which steps are played.
     #[command(flatten)]
     pub frames: FrameArgs,
-    /// Draw at most this many contacts in a frame: the deepest ones of each place; 0 draws none.
-    /// Contacts that the run has not recorded are detected again
+    /// Draw at most this many contacts in a frame, the deepest ones of each place, and as many
+    /// recorded forces, the greatest ones; 0 draws none. Contacts that the run has not recorded are
+    /// detected again
     #[arg(long, value_name = "N", default_value_t = ContactOptions::MOST)]
     pub contacts: usize,
     /// Heading of the page [default: the name of the run]
@@ -55,9 +56,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let run = Playback::new(record, system, args.frames.frames()).map_err(at)?;
     let contacts = contacts(args, &opened, &run, &interrupted).map_err(at)?;
+    let forces = if args.contacts > 0 { run.forces(args.contacts) } else { None };
     let name = || args.run.file_stem().map(|name| name.to_string_lossy().into_owned());
     let title = args.title.clone().or_else(name).unwrap_or_default();
-    let page = page(&run, contacts.as_deref(), &title).map_err(at)?;
+    let page = page(&run, Arrows { contacts: contacts.as_deref(), forces: forces.as_deref() }, &title)
+        .map_err(at)?;
     output::write(output, page.as_bytes())?;
     let drawn = match &contacts {
         None => "none drawn".to_string(),
@@ -66,11 +69,18 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             format!("at most {most} in a frame, of which {} are drawn", most.min(args.contacts))
         }
     };
+    let pushing = match &forces {
+        None => "none recorded".to_string(),
+        Some(frames) => {
+            format!("at most {} in a frame", frames.iter().map(|frame| frame.found).max().unwrap_or(0))
+        }
+    };
     report::table(&[
         ("page", args.output.display().to_string()),
         ("bodies", run.bodies.len().to_string()),
         ("frames", format!("{} of {} states", run.steps.len(), record.times().len())),
         ("contacts", drawn),
+        ("forces", pushing),
         ("size", format!("{:.2} MB", page.len() as f64 / 1e6)),
     ])?;
     Ok(Outcome::Good)

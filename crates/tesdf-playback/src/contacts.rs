@@ -13,8 +13,8 @@ use crate::{Playback, PlaybackError};
 /// Recorded points are 32-bit floats in the world frame. They are used where the run is within this
 /// many diagonals of the origin, so that they are right to 10⁻⁵ of the diagonal.
 const NEAR: f64 = 100.0;
-/// Number of cubes along the diagonal of a run of which each first keeps one contact.
-const CUBES: f64 = 32.0;
+/// Number of cubes along the diagonal of a run of which each first keeps one arrow.
+pub(crate) const CUBES: f64 = 32.0;
 
 /// Options of [`Playback::contacts`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,10 +92,8 @@ impl Playback<'_> {
             };
             let found = contacts.len();
             contacts.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-            if found > options.most {
-                contacts = spread(contacts, self.diagonal() / CUBES, options.most);
-            }
-            frames.push(FrameContacts { found, kept: contacts });
+            let kept = spread(contacts, |c| c.point, self.diagonal() / CUBES, options.most);
+            frames.push(FrameContacts { found, kept });
             done(frame + 1);
         }
         Ok(Some(frames))
@@ -134,13 +132,16 @@ impl Playback<'_> {
     }
 }
 
-/// At most this many contacts, spread over cubes of this edge. They are and stay in the order of
-/// their depth.
-fn spread(contacts: Vec<DrawnContact>, edge: f64, most: usize) -> Vec<DrawnContact> {
+/// At most this many arrows, spread over cubes of this edge. They are and stay in the order of their
+/// importance.
+pub(crate) fn spread<T: Copy>(arrows: Vec<T>, point: fn(&T) -> Vec3, edge: f64, most: usize) -> Vec<T> {
+    if arrows.len() <= most {
+        return arrows;
+    }
     let mut counts: BTreeMap<[i64; 3], usize> = BTreeMap::new();
-    let mut ranked: Vec<(usize, usize)> = Vec::with_capacity(contacts.len());
-    for (place, contact) in contacts.iter().enumerate() {
-        let cube = (contact.point.as_dvec3() / edge).floor().to_array().map(|x| x as i64);
+    let mut ranked: Vec<(usize, usize)> = Vec::with_capacity(arrows.len());
+    for (place, arrow) in arrows.iter().enumerate() {
+        let cube = (point(arrow).as_dvec3() / edge).floor().to_array().map(|x| x as i64);
         let count = counts.entry(cube).or_default();
         ranked.push((*count, place));
         *count += 1;
@@ -149,7 +150,7 @@ fn spread(contacts: Vec<DrawnContact>, edge: f64, most: usize) -> Vec<DrawnConta
     ranked.truncate(most);
     let mut places: Vec<usize> = ranked.into_iter().map(|(_, place)| place).collect();
     places.sort_unstable();
-    places.into_iter().map(|place| contacts[place]).collect()
+    places.into_iter().map(|place| arrows[place]).collect()
 }
 
 #[cfg(test)]
@@ -166,7 +167,9 @@ mod tests {
             contact(1.5, -6.0),
             contact(-0.5, 1.0),
         ];
-        let kept = |most| -> Vec<f64> { spread(all.clone(), 1.0, most).iter().map(|c| c.distance).collect() };
+        let kept = |most| -> Vec<f64> {
+            spread(all.clone(), |c| c.point, 1.0, most).iter().map(|c| c.distance).collect()
+        };
         assert!(kept(0).is_empty());
         assert_eq!(kept(2), [-9.0, -6.0]);
         assert_eq!(kept(3), [-9.0, -6.0, 1.0]);

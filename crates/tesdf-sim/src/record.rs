@@ -17,15 +17,24 @@
 //! | `hidden.steps` | `u64 [H]` | steps with hidden overlaps: one row per step and pair |
 //! | `hidden.ids` | `u32 [H, 2]` | the two bodies |
 //! | `hidden.depths` | `f64 [H]` | lower bound of the depth, m |
+//! | `forces.steps` | `u64 [Q]` | numbers of the steps with recorded forces, from 0 |
+//! | `forces.ends` | `u64 [Q]` | where the contact forces of each of these steps end |
+//! | `forces.ids` | `u32 [F, 2]` | bodies: the force acts on the first, its opposite on the second |
+//! | `forces.points` | `f64 [F, 3]` | where it acts, m, world frame |
+//! | `forces.contacts` | `f32 [F, 6]` | along the normal, and friction, N, world frame |
+//! | `forces.joints` | `f32 [Q · J, 7]` | on the child: force, N; torque, N m; what the motor does |
 //!
-//! S is the number of steps, B of bodies, R of steps with recorded contacts, C of contacts, and H
-//! of hidden overlaps. The contacts and hidden overlaps of a step are those at its beginning, that
-//! is, at `poses[step]`. An overlap of two bodies is hidden when no contact shows it.
+//! S is the number of steps, B of bodies, J of joints, R of steps with recorded contacts, C of
+//! contacts, H of hidden overlaps, Q of steps with recorded forces, and F of contacts that push. The
+//! contacts and hidden overlaps of a step are those at its beginning, that is, at `poses[step]`. Its
+//! [forces](Forces) are means from `poses[step]` to `poses[step + 1]`. An overlap of two bodies is
+//! hidden when no contact shows it.
 //!
-//! A file without hidden overlaps has no `hidden.…` tensors.
+//! A file without hidden overlaps has no `hidden.…` tensors, one without recorded forces no
+//! `forces.…` tensors.
 //!
-//! The metadata has one key, `tesdf_run`. Its value is JSON with `version`, `bodies` (names),
-//! `scene` (the scene as JSON) and `folder`, the folder that the scene's paths are relative to. A
+//! The metadata has one key, `tesdf_run`. Its value is JSON with `version`, `bodies` and `joints`
+//! (names), `scene` (the scene as JSON) and `folder`, the folder that the scene's paths are relative to. A
 //! run that was saved before its end also has `planned`, its planned number of steps. A run that
 //! did not do all that its scene asks has `warnings`: at most one [`Warning`] of each kind, with the
 //! keys `kind`, `names`, `time` (of the first, s), `value` (the worst), `count` and `message`. Those
@@ -34,6 +43,7 @@
 //! A run grows as a journal of steps under its final name. At the end the complete file replaces
 //! the journal. [`RunRecord::open`] reads both. [`InterruptedRun`] reads a journal to resume the
 //! run; the resumed run ends with the same bytes as an uninterrupted run.
+mod forces;
 mod hidden;
 mod journal;
 mod origin;
@@ -53,20 +63,23 @@ use tesdf::save::{SaveError, save_atomic};
 
 use crate::{State, System, Warning};
 
+use forces::ForceRows;
 pub use hidden::HiddenPair;
 use hidden::HiddenRows;
 pub use journal::{InterruptedRun, RunJournal};
 pub use origin::RunOrigin;
 
 /// The version of complete runs and journals that this build writes and reads.
-pub const RUN_VERSION: u32 = 3;
+pub const RUN_VERSION: u32 = 4;
 const KEY: &str = "tesdf_run";
 
-/// States of all bodies over time, and the contacts of some steps.
+/// States of all bodies over time, and the contacts and forces of some steps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunRecord {
     /// Names of the bodies.
     pub bodies: Vec<String>,
+    /// Names of the joints.
+    pub joints: Vec<String>,
     /// The scene, as JSON.
     pub scene: serde_json::Value,
     /// The folder that the scene's paths are relative to. Empty: the current folder of the reader.
@@ -83,6 +96,7 @@ pub struct RunRecord {
     distances: Vec<f32>,
     ids: Vec<[u32; 4]>,
     hidden: HiddenRows,
+    forces: ForceRows,
     /// Warnings, without those of hidden overlaps.
     told: Vec<Warning>,
 }
@@ -159,6 +173,7 @@ pub enum RecordError {
 struct About {
     version: u32,
     bodies: Vec<String>,
+    joints: Vec<String>,
     scene: serde_json::Value,
     #[serde(default)]
     folder: String,
@@ -173,7 +188,8 @@ impl RunRecord {
     /// A record that begins with the state of `system` at time 0.
     pub fn new(system: &System, scene: serde_json::Value) -> Self {
         let bodies = system.bodies().iter().map(|body| body.name.clone()).collect();
-        let mut record = Self { bodies, scene, contact_starts: vec![0], ..Self::default() };
+        let joints = system.joints().iter().map(|joint| joint.name.clone()).collect();
+        let mut record = Self { bodies, joints, scene, contact_starts: vec![0], ..Self::default() };
         record.push(0.0, system);
         record
     }
@@ -183,19 +199,21 @@ impl RunRecord {
     /// # Errors
     /// [`RecordError::Version`], or a warning that cannot be.
     fn of_about(about: About) -> Result<Self, RecordError> {
-        let About { version, bodies, scene, folder, planned, warnings } = about;
+        let About { version, bodies, joints, scene, folder, planned, warnings } = about;
         if version != RUN_VERSION {
             return Err(RecordError::Version { found: version, reads: RUN_VERSION });
         }
         told::check(&warnings, &bodies).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
         let contact_starts = vec![0];
-        Ok(Self { bodies, scene, folder, planned, contact_starts, told: warnings, ..Self::default() })
+        let told = warnings;
+        Ok(Self { bodies, joints, scene, folder, planned, contact_starts, told, ..Self::default() })
     }
 
     fn about(&self) -> About {
         About {
             version: RUN_VERSION,
             bodies: self.bodies.clone(),
+            joints: self.joints.clone(),
             scene: self.scene.clone(),
             folder: self.folder.clone(),
             planned: self.planned,
@@ -345,6 +363,15 @@ impl RunRecord {
             tensors.push(tensor("hidden.ids", Dtype::U32, vec![ids.len(), 2], ids.as_flattened())?);
             tensors.push(tensor("hidden.depths", Dtype::F64, vec![depths.len()], depths)?);
         }
+        let ForceRows { steps, ends, ids, points, contacts, joints } = &self.forces;
+        if !steps.is_empty() {
+            tensors.push(tensor("forces.steps", Dtype::U64, vec![steps.len()], steps)?);
+            tensors.push(tensor("forces.ends", Dtype::U64, vec![ends.len()], ends)?);
+            tensors.push(tensor("forces.ids", Dtype::U32, vec![ids.len(), 2], ids.as_flattened())?);
+            tensors.push(tensor("forces.points", Dtype::F64, vec![ids.len(), 3], points.as_flattened())?);
+            tensors.push(tensor("forces.contacts", Dtype::F32, vec![ids.len(), 6], contacts.as_flattened())?);
+            tensors.push(tensor("forces.joints", Dtype::F32, vec![joints.len(), 7], joints.as_flattened())?);
+        }
         Ok(serialize(tensors, Some(metadata))?)
     }
 
@@ -390,6 +417,17 @@ impl RunRecord {
             },
             Err(_) => HiddenRows::default(),
         };
+        let forces = match file.tensor("forces.steps") {
+            Ok(_) => ForceRows {
+                steps: values(&file, "forces.steps", Dtype::U64, &[])?,
+                ends: values(&file, "forces.ends", Dtype::U64, &[])?,
+                ids: values(&file, "forces.ids", Dtype::U32, &[2])?,
+                points: values(&file, "forces.points", Dtype::F64, &[3])?,
+                contacts: values(&file, "forces.contacts", Dtype::F32, &[6])?,
+                joints: values(&file, "forces.joints", Dtype::F32, &[7])?,
+            },
+            Err(_) => ForceRows::default(),
+        };
         let record = Self {
             poses: values(&file, "poses", Dtype::F64, &[count, 7])?,
             velocities: values(&file, "velocities", Dtype::F64, &[count, 6])?,
@@ -400,6 +438,7 @@ impl RunRecord {
             distances: values(&file, "contacts.distances", Dtype::F32, &[])?,
             ids: values(&file, "contacts.ids", Dtype::U32, &[4])?,
             hidden,
+            forces,
             times,
             ..empty
         };
@@ -418,7 +457,8 @@ impl RunRecord {
             && starts.first() == Some(&0)
             && starts.last() == Some(&(contacts as u64))
             && starts.is_sorted()
-            && self.hidden.fit(self.times.len() as u64, self.bodies.len());
+            && self.hidden.fit(self.times.len() as u64, self.bodies.len())
+            && self.forces.fit(self.times.len() as u64, self.bodies.len(), self.joints.len());
         if fits {
             return Ok(());
         }

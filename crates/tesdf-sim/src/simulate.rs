@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::criterion::{CriterionReport, JointDrift, Report, Trackers, by_name};
-use crate::scene_file::{LimitError, SceneFile};
+use crate::scene_file::{LimitError, RecordSection, SceneFile};
 use crate::script::Scripts;
 use crate::totals::Totals;
 use crate::warning::{Warning, Watch, energies};
@@ -104,6 +104,11 @@ pub enum SimulateError {
     /// A script does not match the bodies and joints.
     #[error("{0}")]
     Script(String),
+    /// The scene records forces, but the engine does not tell them.
+    #[error(
+        "[record] has forces_every, but this engine tells no forces; remove it or use the built-in engine"
+    )]
+    NoForces,
     /// The caller stopped the run.
     #[error("interrupted after {steps} steps")]
     Interrupted {
@@ -193,8 +198,8 @@ pub struct Run {
     time_step: f64,
     /// Number of steps of the whole run.
     steps: u64,
-    /// Contacts are recorded every so many steps; 0 records none.
-    contacts_every: u64,
+    /// What is recorded of which steps.
+    recorded: RecordSection,
     /// The first states since the last step whose overlaps were measured, and what they were.
     overlap: OnceLock<(Vec<State>, Option<Warning>)>,
 }
@@ -231,7 +236,6 @@ impl Run {
         }
         record.reserve(steps).map_err(|_| LimitError::memory(steps, record.bodies.len()))?;
         record.plan(Some(steps));
-        let contacts_every = u64::from(scene.record.contacts_every);
         Ok(Self {
             record,
             totals,
@@ -241,7 +245,7 @@ impl Run {
             energy,
             time_step: scene.time_step,
             steps,
-            contacts_every,
+            recorded: scene.record,
             overlap: OnceLock::new(),
         })
     }
@@ -274,16 +278,20 @@ impl Run {
     /// Makes one step with `engine`. The scene's duration does not limit the number of steps.
     ///
     /// # Errors
-    /// [`SimulateError::Step`]; the record then ends before the step.
+    /// [`SimulateError::Step`] or [`SimulateError::NoForces`]; the record then ends before the step.
     pub fn step<'a>(&'a mut self, engine: &'a mut dyn Dynamics) -> Result<Moment<'a>, SimulateError> {
         let (step, h) = (self.record.steps(), self.time_step);
         let failed = |source| SimulateError::Step { step, source };
         self.scripts.drive(engine, step as f64 * h, h).map_err(failed)?;
         let before = energies(engine.system());
         let report = engine.step(h).map_err(failed)?;
+        let is_due = |every: u32| every > 0 && step.is_multiple_of(every.into());
+        if is_due(self.recorded.forces_every) {
+            self.record.push_forces(step, engine.forces().ok_or(SimulateError::NoForces)?);
+        }
         let (system, time) = (engine.system(), (step + 1) as f64 * h);
         self.record.push(time, system);
-        if self.contacts_every > 0 && step % self.contacts_every == 0 {
+        if is_due(self.recorded.contacts_every) {
             self.record.push_contacts(step, engine.contacts(), system);
         }
         self.trackers.observe(system, h);

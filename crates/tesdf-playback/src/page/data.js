@@ -46,6 +46,14 @@ async function readRun() {
     contacts.normals = new Int16Array(take(count).buffer);
     contacts.distances = floats(take(count));
   }
+  if (run.forces) {
+    const { forces } = run;
+    forces.starts = take(frames + 1);
+    forces.found = take(frames);
+    const count = forces.starts[frames];
+    forces.points = floats(take(3 * count));
+    forces.vectors = floats(take(3 * count));
+  }
   return run;
 }
 
@@ -72,11 +80,12 @@ function poseAt(body, frames, frame, share) {
   return { position, turn: turn.map((q) => q / length) };
 }
 
-// A length with its unit, in three digits.
-function lengthText(metres) {
-  const size = Math.abs(metres);
-  const units = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
-  const [unit, name] = units.find(([unit]) => size >= 0.9995 * unit) ?? [1e-9, "nm"];
-  const number = metres / unit;
-  return size < 5e-12 ? "0" : `${+number.toPrecision(3)} ${name}`.replace("-", "−");
+// A number with its unit, in three digits. The units ascend from the smallest one.
+function valueText(value, units) {
+  const size = Math.abs(value);
+  const [unit, name] = units.findLast(([unit]) => size >= 0.9995 * unit) ?? units[0];
+  return size < 5e-3 * units[0][0] ? "0" : `${+(value / unit).toPrecision(3)} ${name}`.replace("-", "−");
 }
+
+const lengthText = (metres) => valueText(metres, [[1e-9, "nm"], [1e-6, "µm"], [1e-3, "mm"], [1, "m"]]);
+const forceText = (newtons) => valueText(newtons, [[1e-6, "µN"], [1e-3, "mN"], [1, "N"], [1e3, "kN"], [1e6, "MN"]]);

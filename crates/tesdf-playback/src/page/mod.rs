@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use tesdf::glam::{DVec2, DVec3, Vec3};
 
 use crate::contacts::FrameContacts;
+use crate::forces::FrameForces;
 use crate::playback::{Part, Playback};
 use crate::{PlaybackError, simple};
 use numbers::Numbers;
@@ -24,16 +25,20 @@ const SCRIPT: &str = concat!(
 /// Most bytes of a page. Browsers refuse texts of some more.
 const MOST: u64 = 400_000_000;
 
-/// The bytes of a page, in HTML, that plays the run. `contacts` are those of
-/// [`Playback::contacts`]; `None`: the page has none. `title` is its heading.
+/// What a page draws besides the bodies.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Arrows<'a> {
+    /// Those of [`Playback::contacts`]; `None`: the page has none.
+    pub contacts: Option<&'a [FrameContacts]>,
+    /// Those of [`Playback::forces`]; `None`: the page has none.
+    pub forces: Option<&'a [FrameForces]>,
+}
+
+/// The bytes of a page, in HTML, that plays the run. `title` is its heading.
 ///
 /// # Errors
 /// [`PlaybackError`]: a state is not valid, or the page would be larger than 400 MB.
-pub fn page(
-    run: &Playback<'_>,
-    contacts: Option<&[FrameContacts]>,
-    title: &str,
-) -> Result<String, PlaybackError> {
+pub fn page(run: &Playback<'_>, arrows: Arrows<'_>, title: &str) -> Result<String, PlaybackError> {
     let mut numbers = Numbers::default();
     let meshes: Vec<Value> = run
         .meshes
@@ -61,12 +66,14 @@ pub fn page(
             "phase": phase.to_array(),
         }));
     }
-    let contacts = contacts.map(|frames| push_contacts(&mut numbers, frames));
+    let contacts = arrows.contacts.map(|frames| push_contacts(&mut numbers, frames));
+    let forces = arrows.forces.map(|frames| push_forces(&mut numbers, frames));
     let around = |p: DVec3| (p - run.centre).to_array();
     let warnings: Vec<String> = run.record.warnings().into_iter().map(|warning| warning.message).collect();
     let about = json!({
         "warnings": warnings,
         "times": run.times, "steps": run.steps, "meshes": meshes, "bodies": bodies, "contacts": contacts,
+        "forces": forces,
         "bounds": [around(run.bounds.min), around(run.bounds.max)], "middle": around(run.bounds.center()),
         "diagonal": run.diagonal(), "square": square,
     });
@@ -89,13 +96,29 @@ pub fn page(
     Ok(page)
 }
 
+/// Where the arrows of each frame start, and where the last ones end.
+fn starts(counts: impl Iterator<Item = usize>) -> impl Iterator<Item = u32> {
+    let ends = counts.scan(0, |end, count| {
+        *end += count as u32;
+        Some(*end)
+    });
+    std::iter::once(0).chain(ends)
+}
+
+/// Appends the forces to the numbers, and describes them.
+fn push_forces(numbers: &mut Numbers, frames: &[FrameForces]) -> Value {
+    numbers.push(starts(frames.iter().map(|frame| frame.kept.len())));
+    numbers.push(frames.iter().map(|frame| frame.found as u32));
+    let all = || frames.iter().flat_map(|frame| &frame.kept);
+    numbers.push_floats(all().flat_map(|f| f.point.to_array()));
+    numbers.push_floats(all().flat_map(|f| f.force.to_array()));
+    let steps: Vec<Option<u64>> = frames.iter().map(|frame| frame.step).collect();
+    json!({ "steps": steps, "greatest": all().map(|f| f.force.length()).fold(0.0, f32::max) })
+}
+
 /// Appends the contacts to the numbers, and describes them.
 fn push_contacts(numbers: &mut Numbers, frames: &[FrameContacts]) -> Value {
-    let mut starts = vec![0];
-    for frame in frames {
-        starts.push(starts[starts.len() - 1] + frame.kept.len() as u32);
-    }
-    numbers.push(starts.into_iter());
+    numbers.push(starts(frames.iter().map(|frame| frame.kept.len())));
     numbers.push(frames.iter().map(|frame| frame.found as u32));
     numbers.push_floats(frames.iter().map(|frame| frame.kept.first().map_or(0.0, |c| c.distance as f32)));
     let all = || frames.iter().flat_map(|frame| &frame.kept);

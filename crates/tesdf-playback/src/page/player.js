@@ -118,6 +118,7 @@ class Player {
     element("time").textContent = `${this.time.toFixed(digits)} s of ${times.at(-1).toFixed(digits)} s`;
     const nearest = share < 0.5 ? frame : frame + 1;
     element("facts").textContent = `frame ${nearest + 1} of ${times.length} · step ${steps[nearest]}`;
+    if (this.run.forces) this.writeForces(nearest);
     if (!contacts) return;
     const [found, deepest] = [contacts.found[nearest], contacts.deepest[nearest]];
     const shown = contacts.starts[nearest + 1] - contacts.starts[nearest];
@@ -125,6 +126,17 @@ class Player {
     if (shown < found) parts.push(`${shown} drawn`);
     if (found > 0) parts.push(deepest < 0 ? `deepest ${lengthText(-deepest)}` : `nearest ${lengthText(deepest)} apart`);
     element("contact-facts").textContent = parts.join(", ");
+  }
+
+  writeForces(frame) {
+    const { starts, found, steps, vectors, greatest } = this.run.forces;
+    const [first, shown] = [starts[frame], starts[frame + 1] - starts[frame]];
+    const parts = [found[frame] === 1 ? "1 force" : `${found[frame]} forces`];
+    if (steps[frame] !== null) parts[0] += ` in step ${steps[frame]}`;
+    if (shown < found[frame]) parts.push(`${shown} drawn`);
+    // The greatest one of a frame comes first.
+    if (shown > 0) parts.push(`greatest ${forceText(Math.hypot(...vectors.subarray(3 * first, 3 * first + 3)))}`);
+    element("force-facts").textContent = `${parts.join(", ")}; the longest arrow is ${forceText(greatest)}`;
   }
 
   fillLists() {
@@ -156,8 +168,11 @@ class Player {
     element("speed").append(...names.map((name) => new Option(name)));
     const slow = SPEEDS.findLastIndex((speed) => this.seconds / speed >= LEAST_SECONDS);
     element("speed").selectedIndex = Math.min(Math.max(slow, 0), SPEEDS.indexOf(1));
+    element("forces").hidden = !this.run.forces;
     if (!contacts) return;
     element("contacts").hidden = false;
+    // Contacts and forces are at the same places.
+    element("show-contacts").checked = this.scene.showContacts;
     // The colours of the arrows, from the deepest overlap to the widest gap.
     const { most_deep: deep, most_apart: apart } = contacts;
     const marks = [];
@@ -187,6 +202,10 @@ class Player {
       this.scene.showContacts = event.target.checked;
       this.show();
     });
+    element("show-forces").addEventListener("change", (event) => {
+      this.scene.showForces = event.target.checked;
+      this.show();
+    });
     addEventListener("resize", () => this.leaveRoom());
     addEventListener("keydown", (event) => this.key(event));
     this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
@@ -212,6 +231,7 @@ class Player {
       c: box("show-contacts"),
       f: () => this.fit(),
       l: box("loop"),
+      p: box("show-forces"),
     };
     const action = actions[event.key] ?? actions[event.key.toLowerCase()];
     if (!action) return;

@@ -1,8 +1,10 @@
-// Draws the bodies, the floors and the contacts of a frame.
+// Draws the bodies, the floors, the contacts and the forces of a frame.
 
 const SHADOW_SIZE = 2048;
-// Length of an arrow, in pixels of the page.
-const ARROW_SIZE = 30;
+// Length of the arrow of a contact and of the greatest force, in pixels of the page.
+const CONTACT_LENGTH = 30;
+const FORCE_LENGTH = 100;
+const FORCE_COLOUR = [0.08, 0.3, 0.12];
 
 class Program {
   constructor(gl, { vertex, fragment }) {
@@ -53,11 +55,21 @@ function arrowMesh() {
   return { positions, directions };
 }
 
+// Yellow where bodies touch, red and violet where they overlap, blue where they are apart.
+function contactColour(gap, deep, apart) {
+  const share = (value, most) => (most > 0 ? Math.sqrt(Math.min(Math.max(value / most, 0), 1)) : 0);
+  const mix = (a, b, s) => a.map((x, k) => x * (1 - s) + b[k] * s);
+  const touching = [0.98, 0.72, 0.1];
+  if (gap >= 0) return mix(touching, [0.1, 0.6, 0.66], share(gap, apart));
+  const s = 2 * share(-gap, deep);
+  return mix(mix(touching, [0.9, 0.16, 0.14], Math.min(s, 1)), [0.42, 0, 0.22], Math.max(s - 1, 0));
+}
+
 class Scene {
   constructor(canvas, run) {
     const gl = canvas.getContext("webgl2", { antialias: true, alpha: true });
     if (!gl) throw new Error("this browser has no WebGL 2, which draws the bodies");
-    Object.assign(this, { gl, canvas, run, hidden: new Set(), highlighted: -1, showContacts: true });
+    Object.assign(this, { gl, canvas, run, hidden: new Set(), highlighted: -1, showContacts: !run.forces, showForces: true });
     this.programs = {};
     for (const [name, texts] of Object.entries({ BODY, DEPTH, SHADE, FLOOR, ARROW })) {
       this.programs[name] = new Program(gl, texts);
@@ -113,9 +125,9 @@ class Scene {
     this.arrowCorners = positions.length / 3;
     this.arrowInstances = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, this.arrowInstances);
-    [[2, 3, 0], [3, 3, 12], [4, 1, 24]].forEach(([location, size, offset]) => {
+    [2, 3, 4].forEach((location, k) => {
       gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 28, offset);
+      gl.vertexAttribPointer(location, 3, gl.FLOAT, false, 36, 12 * k);
       gl.vertexAttribDivisor(location, 1);
     });
   }
@@ -242,7 +254,8 @@ class Scene {
     gl.enable(gl.BLEND);
     this.drawFloors(use, camera);
     const nearest = share < 0.5 ? frame : Math.min(frame + 1, run.times.length - 1);
-    if (run.contacts && this.showContacts) this.drawContacts(use, camera, nearest, height / ratio);
+    if (run.contacts && this.showContacts) this.drawArrows(use, camera, this.contactArrows(nearest), height / ratio);
+    if (run.forces && this.showForces) this.drawArrows(use, camera, this.forceArrows(nearest), height / ratio);
     gl.disable(gl.BLEND);
   }
 
@@ -269,28 +282,43 @@ class Scene {
     }
   }
 
-  drawContacts(use, camera, frame, height) {
-    const { gl } = this;
-    const { contacts } = this.run;
-    const { ARROW } = this.programs;
-    const [first, end] = [contacts.starts[frame], contacts.starts[frame + 1]];
-    const values = new Float32Array(7 * (end - first));
-    for (let k = first; k < end; k++) {
-      const normal = ofOctahedron(contacts.normals[2 * k], contacts.normals[2 * k + 1]);
-      values.set([...contacts.points.subarray(3 * k, 3 * k + 3), ...normal, contacts.distances[k]], 7 * (k - first));
+  // Arrows: where they begin, their vector in pixels, and their colour.
+  contactArrows(frame) {
+    const { starts, points, normals, distances, most_deep: deep, most_apart: apart } = this.run.contacts;
+    const arrows = [];
+    for (let k = starts[frame]; k < starts[frame + 1]; k++) {
+      const normal = ofOctahedron(normals[2 * k], normals[2 * k + 1]);
+      const vector = normal.map((x) => CONTACT_LENGTH * x);
+      arrows.push(...points.subarray(3 * k, 3 * k + 3), ...vector, ...contactColour(distances[k], deep, apart));
     }
+    return arrows;
+  }
+
+  forceArrows(frame) {
+    const { starts, points, vectors, greatest } = this.run.forces;
+    const arrows = [];
+    for (let k = starts[frame]; k < starts[frame + 1]; k++) {
+      const [point, force] = [points, vectors].map((all) => [...all.subarray(3 * k, 3 * k + 3)]);
+      const vector = force.map((x) => (FORCE_LENGTH * x) / greatest);
+      if (dot(vector, vector) > 0) arrows.push(...point, ...vector, ...FORCE_COLOUR);
+    }
+    return arrows;
+  }
+
+  drawArrows(use, camera, arrows, height) {
+    const { gl } = this;
+    const { ARROW } = this.programs;
     use(ARROW);
     gl.uniform3fv(ARROW.get("target"), camera.target);
     gl.uniform3fv(ARROW.get("towards"), camera.axes.forward.map((x) => -x));
     gl.uniform1f(ARROW.get("pixel"), (2 * HALF_VIEW) / height);
-    gl.uniform1f(ARROW.get("size"), ARROW_SIZE);
-    gl.uniform2f(ARROW.get("range"), contacts.most_deep, contacts.most_apart);
+    gl.uniform1f(ARROW.get("thick"), CONTACT_LENGTH);
     gl.bindVertexArray(this.arrows);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.arrowInstances);
-    gl.bufferData(gl.ARRAY_BUFFER, values, gl.DYNAMIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(arrows), gl.DYNAMIC_DRAW);
     const draw = (alpha) => {
       gl.uniform1f(ARROW.get("alpha"), alpha);
-      gl.drawArraysInstanced(gl.TRIANGLES, 0, this.arrowCorners, end - first);
+      gl.drawArraysInstanced(gl.TRIANGLES, 0, this.arrowCorners, arrows.length / 9);
     };
     // Faint where a body hides them, then those that are seen.
     gl.depthMask(false);

@@ -146,34 +146,33 @@ void main() {
 }`,
 };
 
-// Arrows of contacts: a size in pixels, from the point along the normal.
+// Arrows from a point along a vector in pixels.
 const ARROW = {
   vertex: `#version 300 es
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 direction;
 layout(location = 2) in vec3 point;
-layout(location = 3) in vec3 normal;
-layout(location = 4) in float gap;
+layout(location = 3) in vec3 along;
+layout(location = 4) in vec3 tint;
 uniform mat4 view;
 uniform vec3 target;
 uniform float pixel;
-uniform float size;
-uniform vec2 range;
+uniform float thick;
 out vec3 colour;
 out vec3 facing;
 void main() {
   vec3 base = point - target;
-  float unit = size * pixel * (view * vec4(base, 1.0)).w;
+  float unit = pixel * (view * vec4(base, 1.0)).w;
+  float size = length(along);
+  vec3 normal = along / size;
   vec3 u = normalize(cross(normal, abs(normal.z) < 0.9 ? vec3(0, 0, 1) : vec3(1, 0, 0)));
   vec3 v = cross(normal, u);
   mat3 turn = mat3(u, v, normal);
   facing = turn * direction;
-  gl_Position = view * vec4(base + turn * position * unit, 1.0);
-  float deep = range.x > 0.0 ? sqrt(clamp(-gap / range.x, 0.0, 1.0)) : 0.0;
-  float apart = range.y > 0.0 ? sqrt(clamp(gap / range.y, 0.0, 1.0)) : 0.0;
-  vec3 touching = vec3(0.98, 0.72, 0.10);
-  colour = gap < 0.0 ? mix(mix(touching, vec3(0.90, 0.16, 0.14), min(2.0 * deep, 1.0)), vec3(0.42, 0.0, 0.22), max(2.0 * deep - 1.0, 0.0))
-                     : mix(touching, vec3(0.10, 0.60, 0.66), apart);
+  // A long arrow is not thicker than that of a contact.
+  vec3 sized = vec3(vec2(min(size, thick)), size) * position;
+  gl_Position = view * vec4(base + turn * sized * unit, 1.0);
+  colour = tint;
 }`,
   fragment: `#version 300 es
 precision highp float;

@@ -11,7 +11,7 @@ use flate2::read::ZlibDecoder;
 use serde_json::Value;
 use tesdf::collide::{CollideError, CollideOptions, ContactsPer, Mode, detect};
 use tesdf::glam::{DVec3, Vec3};
-use tesdf_playback::{ContactOptions, FrameContacts, Frames, Playback, PlaybackError, page};
+use tesdf_playback::{Arrows, ContactOptions, FrameContacts, Frames, Playback, PlaybackError, page};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{RunRecord, System, simulate};
 
@@ -74,6 +74,7 @@ contact_distance = 1e-3
 
 [record]
 contacts_every = 3
+forces_every = 4
 "#;
 
 fn simulated() -> (RunRecord, System, LoadedScene) {
@@ -93,7 +94,7 @@ fn the_page_has_the_meshes_and_the_poses_of_the_run() {
     for shift in [DVec3::ZERO, DVec3::new(5e6, -7e6, 1e6)] {
         let (record, system) = run(shift);
         let playback = Playback::new(&record, &system, Frames::Every(2.try_into().unwrap())).unwrap();
-        let text = page(&playback, None, "run").unwrap();
+        let text = page(&playback, Arrows::default(), "run").unwrap();
         let mut read = Numbers::new(&text);
         let frames = playback.steps.len();
         assert_eq!(read.about["steps"], serde_json::json!([0, 2, 4, 6, 8, 9]));
@@ -170,7 +171,9 @@ fn the_page_has_the_deepest_contacts() {
     let found = playback.contacts(&system, &options, &AtomicBool::new(false), |done| seen = done);
     let found = found.unwrap().unwrap();
     assert_eq!(seen, playback.steps.len());
-    let mut read = Numbers::new(&page(&playback, Some(&found), "run").unwrap());
+    let forces = playback.forces(2).unwrap();
+    let arrows = Arrows { contacts: Some(&found), forces: Some(&forces) };
+    let mut read = Numbers::new(&page(&playback, arrows, "run").unwrap());
     let meshes = read.about["meshes"].as_array().unwrap().clone();
     for about in meshes {
         let [vertices, corners] = ["vertices", "corners"].map(|key| about[key].as_u64().unwrap() as usize);
@@ -195,9 +198,36 @@ fn the_page_has_the_deepest_contacts() {
             assert_eq!(distances[3 * k + i], contact.distance as f32);
         }
     }
+    let starts = read.words(frames + 1);
+    let counts = read.words(frames);
+    let total = starts[frames] as usize;
+    let [points, vectors] = [(); 2].map(|()| read.floats(3 * total));
+    let mut weight = 0.0;
+    for (k, frame) in forces.iter().enumerate() {
+        assert_eq!(frame.step, Some(4 * (playback.steps[k] as u64 / 4)));
+        assert_eq!(read.about["forces"]["steps"][k], frame.step.unwrap());
+        assert_eq!((counts[k] as usize, starts[k + 1] - starts[k]), (frame.found, frame.kept.len() as u32));
+        assert!(frame.kept.len() == frame.found.min(2));
+        for (i, drawn) in frame.kept.iter().enumerate() {
+            let at = 3 * (starts[k] as usize + i);
+            assert_eq!(
+                [Vec3::from_slice(&points[at..]), Vec3::from_slice(&vectors[at..])],
+                [drawn.point, drawn.force]
+            );
+            assert!(drawn.force.z > 0.0, "the floor pushes the box up: {}", drawn.force);
+            weight = drawn.force.length().max(weight);
+        }
+    }
+    assert_eq!(read.about["forces"]["greatest"], weight);
     assert_eq!(read.at, read.bytes.len());
     let least = found.iter().map(|frame| frame.kept[0].distance).fold(0.0, f64::min);
     assert_eq!(read.about["contacts"]["most_deep"], -least);
+}
+
+#[test]
+fn a_run_without_recorded_forces_has_none() {
+    let (record, system) = run(DVec3::ZERO);
+    assert_eq!(Playback::new(&record, &system, Frames::default()).unwrap().forces(9), None);
 }
 
 #[test]

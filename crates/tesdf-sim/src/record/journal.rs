@@ -15,7 +15,8 @@
 //! Frame k + 1 is the state after k steps: a [`StateHead`], then poses and velocities. The contacts
 //! at the beginning of the last step follow if they are recorded: points, normals, distances and
 //! ids, in the types of the complete file. The ids and depths of the hidden overlaps at that time
-//! follow. Where the `warnings` of the metadata are others than those of the frame before, they come
+//! follow, then the forces of the last step if they are recorded: ids, points and contacts, and
+//! those of all joints. Where the `warnings` of the metadata are others than those of the frame before, they come
 //! last, as JSON; each replaces all before.
 //!
 //! Each frame is written by one call, which does not wait for the disk. A process that is killed
@@ -36,7 +37,7 @@ use crate::{Residual, RunOrigin, StepReport, Warning};
 const MAGIC: &[u8; 8] = b"tesdfrun";
 const HEAD: usize = MAGIC.len() + size_of::<u32>();
 const CHECKSUM: usize = 16;
-/// In place of a number of contacts: the contacts are not recorded.
+/// In place of a number of contacts or forces: they are not recorded.
 const NOT_KEPT: u64 = u64::MAX;
 
 /// An interrupted run, with everything that is needed to resume it.
@@ -86,6 +87,8 @@ struct StateHead {
     kept: u64,
     /// Number of hidden overlaps in this frame.
     hidden: u64,
+    /// Number of contact forces in this frame, or [`NOT_KEPT`].
+    forces: u64,
     /// Bytes of the warnings in this frame; 0 where they are those of the frame before.
     warnings: u64,
     iterations: u32,
@@ -94,7 +97,7 @@ struct StateHead {
     residual: [f64; 2],
 }
 
-const _: () = assert!(size_of::<StateHead>() == 88);
+const _: () = assert!(size_of::<StateHead>() == 96);
 
 /// Whether `bytes` begin like a journal.
 pub(super) fn is_journal(bytes: &[u8]) -> bool {
@@ -266,6 +269,10 @@ fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8]) -> V
     let before = step.checked_sub(1).map(|before| before as u64);
     let kept = before.and_then(|before| record.contact_range(before));
     let hidden = before.map_or(0..0, |before| record.hidden.of_step(before));
+    let forces = before.and_then(|before| record.forces.place(before));
+    let pushing = forces.map(|place| record.forces.contacts_at(place));
+    let joints = record.joints.len();
+    let of_joints = forces.map_or(0..0, |place| place * joints..(place + 1) * joints);
     let head = StateHead {
         time: record.times[step],
         deepest: report.deepest.unwrap_or(f64::NAN),
@@ -274,13 +281,15 @@ fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8]) -> V
         solution: nanoseconds(report.solution),
         kept: kept.as_ref().map_or(NOT_KEPT, |range| range.len() as u64),
         hidden: hidden.len() as u64,
+        forces: pushing.as_ref().map_or(NOT_KEPT, |range| range.len() as u64),
         warnings: told.len() as u64,
         iterations: report.iterations,
         converged: report.converged.into(),
         residual: [report.residual.way, report.residual.force],
     };
     let bodies = record.bodies.len();
-    let (of_bodies, kept) = (step * bodies..(step + 1) * bodies, kept.unwrap_or_default());
+    let of_bodies = step * bodies..(step + 1) * bodies;
+    let [kept, pushing] = [kept, pushing].map(Option::unwrap_or_default);
     [
         bytemuck::bytes_of(&head),
         bytemuck::cast_slice(&record.poses[of_bodies.clone()]),
@@ -291,6 +300,10 @@ fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8]) -> V
         bytemuck::cast_slice(&record.ids[kept]),
         bytemuck::cast_slice(&record.hidden.ids[hidden.clone()]),
         bytemuck::cast_slice(&record.hidden.depths[hidden]),
+        bytemuck::cast_slice(&record.forces.ids[pushing.clone()]),
+        bytemuck::cast_slice(&record.forces.points[pushing.clone()]),
+        bytemuck::cast_slice(&record.forces.contacts[pushing]),
+        bytemuck::cast_slice(&record.forces.joints[of_joints]),
         told,
     ]
     .concat()
@@ -323,6 +336,15 @@ fn read_state<'a>(mut payload: &'a [u8], run: &mut PartialRun) -> Option<&'a [u8
         record.hidden.ids.extend(take::<[u32; 2]>(&mut payload, count)?);
         record.hidden.depths.extend(take::<f64>(&mut payload, count)?);
         record.hidden.steps.resize(record.hidden.ids.len(), steps.checked_sub(1)?);
+    }
+    if head.forces != NOT_KEPT {
+        let (count, forces) = (usize::try_from(head.forces).ok()?, &mut record.forces);
+        forces.ids.extend(take::<[u32; 2]>(&mut payload, count)?);
+        forces.points.extend(take::<[f64; 3]>(&mut payload, count)?);
+        forces.contacts.extend(take::<[f32; 6]>(&mut payload, count)?);
+        forces.joints.extend(take::<[f32; 7]>(&mut payload, record.joints.len())?);
+        forces.steps.push(steps.checked_sub(1)?);
+        forces.ends.push(forces.ids.len() as u64);
     }
     if steps > 0 {
         run.totals.add(&StepReport {

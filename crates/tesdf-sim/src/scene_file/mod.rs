@@ -444,4 +444,7 @@ pub struct RecordSection {
     /// Contacts are recorded at every step whose number, from 0, is a multiple of this value; 0
     /// records none. A contact takes 44 bytes.
     pub contacts_every: u32,
+    /// The forces of contacts and joints are recorded at every step whose number, from 0, is a
+    /// multiple of this value; 0 records none. A contact that pushes takes 56 bytes, a joint 28.
+    pub forces_every: u32,
 }

@@ -1,10 +1,14 @@
 //! The forces of contacts and joints that a step tells.
+use std::ops::ControlFlow;
+
 use tesdf::collide::{CollideError, CollideOptions, Contacts, Instance, Pose, Scene, Shape};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::newton::{Newton, NewtonOptions};
+use tesdf_sim::record::RunRecord;
+use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{
     ContactForce, Drive, Dynamics, Forces, Joint, JointKind, Mass, MassProperties, Motor, State, StepReport,
-    System,
+    System, simulate,
 };
 
 use crate::support::bench::{Bench, Body, Kind, STEP, ball};
@@ -173,4 +177,69 @@ fn coordinates_count_turns() {
         let found = engine.system().coordinate_rates()[0];
         assert!((found / rate - 1.0).abs() < 1e-2, "{rate} rad/s: {found}");
     }
+}
+
+/// A box on a floor and a pendulum, with forces in the record of every third step.
+const RECORDED: &str = r#"
+time_step = 2e-3
+duration = 0.02
+
+[record]
+forces_every = 3
+
+[[bodies]]
+name = "floor"
+shape = "plane"
+fixed = true
+
+[[bodies]]
+name = "box"
+shape = { box = { half_extents = [0.02, 0.02, 0.01] } }
+mass = 0.5
+translation = [0, 0, 0.01]
+
+[[bodies]]
+name = "bob"
+shape = { sphere = { radius = 0.01 } }
+mass = 0.2
+translation = [0.2, 0, 0.1]
+
+[[joints]]
+name = "pivot"
+kind = "hinge"
+child = "bob"
+anchor = [0.25, 0, 0.1]
+axis = [0, 1, 0]
+"#;
+
+#[test]
+fn a_record_has_the_forces_of_its_steps() {
+    let loaded = LoadedScene::parse(RECORDED.into(), "scene.toml").unwrap();
+    let engine = || loaded.newton(loaded.system().unwrap()).unwrap();
+    let (record, _) = simulate(&loaded.scene, &mut engine(), |_| ControlFlow::Continue(())).unwrap();
+    let read = RunRecord::from_bytes(&record.to_bytes().unwrap()).unwrap();
+    assert_eq!((&read, &read.joints[..]), (&record, &["pivot".to_string()][..]));
+    let mut again = engine();
+    let mut told = Vec::new();
+    for step in 0..10 {
+        again.step(2e-3).unwrap();
+        if step % 3 == 0 {
+            told.push((step, again.forces().unwrap().clone()));
+        }
+    }
+    let near = |a: DVec3, b: DVec3| a.distance(b) <= 1e-6 * (a.length() + 1e-3);
+    let all: Vec<_> = read.forces().collect();
+    assert_eq!(all.len(), told.len());
+    for ((step, found), (expected_step, expected)) in all.iter().zip(&told) {
+        assert_eq!(step, expected_step);
+        assert!(!found.contacts.is_empty() && found.contacts.len() == expected.contacts.len());
+        for (a, b) in found.contacts.iter().zip(&expected.contacts) {
+            assert_eq!((a.bodies, a.point), (b.bodies, b.point));
+            assert!(near(a.force(), b.force()) && near(a.normal, b.normal), "step {step}: {a:?} {b:?}");
+        }
+        let [a, b] = [found.joints[0], expected.joints[0]];
+        assert!(near(a.force, b.force) && near(a.torque, b.torque) && a.force.length() > 0.01, "{a:?}");
+    }
+    let latest: Vec<u64> = (0..10).map(|step| read.latest_forces(step).unwrap().0).collect();
+    assert_eq!(latest, [0, 0, 0, 3, 3, 3, 6, 6, 6, 9]);
 }

@@ -6,11 +6,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use tesdf::save::{Destination, SaveOptions};
-use tesdf_sim::record::{InterruptedRun, RecordError, RunJournal, RunOrigin, RunRecord};
+use tesdf_sim::record::{InterruptedRun, RUN_VERSION, RecordError, RunJournal, RunOrigin, RunRecord};
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{Dynamics, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};
 
-/// A wedge falls onto a floor and a brick. The criterion follows it as a screw, although it is not
+/// A wedge falls onto a floor and a brick, and a door swings. The criterion follows it as a screw, although it is not
 /// one.
 const SCENE: &str = r#"
 time_step = 2e-3
@@ -18,6 +18,7 @@ duration = 0.06
 
 [record]
 contacts_every = 3
+forces_every = 2
 
 [criterion.screw]
 body = "wedge"
@@ -43,6 +44,19 @@ mesh = "wedge.obj"
 density = 1000
 translation = [0.012, 0.003, 0.022]
 angular_velocity = [3, 20, 1]
+
+[[bodies]]
+name = "door"
+shape = { sphere = { radius = 0.01 } }
+mass = 0.2
+translation = [0.2, 0, 0.1]
+
+[[joints]]
+name = "hinge"
+kind = "hinge"
+child = "door"
+anchor = [0.23, 0, 0.1]
+axis = [0, 1, 0]
 "#;
 
 const WEDGE: &str = "v 0 0 0\nv .02 0 0\nv 0 .02 0\nv 0 0 .02\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
@@ -253,8 +267,9 @@ fn complete_runs_and_other_files_are_not_resumed() {
     bench.whole().0.save(&path).unwrap();
     assert!(matches!(open(), RecordError::Complete { steps: STEPS }));
     fs::write(&path, b"tesdfrun\x09\0\0\0").unwrap();
-    assert!(matches!(open(), RecordError::Version { found: 9, reads: 3 }));
-    for bytes in [&b"tesdfrun"[..], b"tesdfrun\x03\0\0\0", b"solid cube"] {
+    assert!(matches!(open(), RecordError::Version { found: 9, reads: RUN_VERSION }));
+    let head = [&b"tesdfrun"[..], &RUN_VERSION.to_le_bytes()].concat();
+    for bytes in [&head[..8], &head, b"solid cube"] {
         fs::write(&path, bytes).unwrap();
         let text = open().to_string();
         assert!(text.starts_with("not a run of tesdf: ") && text.contains("simulate"), "{text}");

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use tesdf::collide::{Contact, HiddenOverlap, InstanceId};
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::newton::Newton;
-use tesdf_sim::record::{InterruptedRun, RecordError, RunJournal, RunOrigin, RunRecord};
+use tesdf_sim::record::{InterruptedRun, RUN_VERSION, RecordError, RunJournal, RunOrigin, RunRecord};
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{
     Dynamics, DynamicsError, Motor, PartialRun, Run, State, StepReport, System, Warning, WarningKind, Wrench,
@@ -348,7 +348,7 @@ fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 /// A journal of these frames, with right checksums.
 fn journal_of(frames: &[Vec<u8>]) -> Vec<u8> {
-    let mut bytes = [&b"tesdfrun"[..], &3u32.to_le_bytes()].concat();
+    let mut bytes = [&b"tesdfrun"[..], &RUN_VERSION.to_le_bytes()].concat();
     for (number, payload) in (0u64..).zip(frames) {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&number.to_le_bytes()).update(payload);
@@ -363,7 +363,7 @@ fn journal_of(frames: &[Vec<u8>]) -> Vec<u8> {
 #[test]
 fn frames_with_other_contents_are_read_or_refused() {
     /// Offset of the length of the warnings in the head of a state.
-    const LENGTH: usize = 56;
+    const LENGTH: usize = 64;
     let (folder, destination) = journal();
     run(&load(&without_drives()), &destination, None, 14);
     let bytes = fs::read(folder.path().join("run")).unwrap();

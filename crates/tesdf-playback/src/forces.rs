@@ -1,0 +1,58 @@
+//! The forces of a run's frames.
+use tesdf::glam::Vec3;
+
+use crate::Playback;
+use crate::contacts::{CUBES, spread};
+
+/// The contact forces of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameForces {
+    /// The step whose mean forces they are: the last recorded one that begins at the frame or
+    /// before. `None`: there is none.
+    pub step: Option<u64>,
+    /// Number of contacts that push.
+    pub found: usize,
+    /// Those that are kept, the greatest first.
+    pub kept: Vec<DrawnForce>,
+}
+
+/// A force that is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawnForce {
+    /// Where it acts, m, relative to the centre of the run.
+    pub point: Vec3,
+    /// The force with friction on the body with the greater number, N, world frame.
+    pub force: Vec3,
+}
+
+impl Playback<'_> {
+    /// The contact forces of each frame, of which at most `most` are kept: the greatest of each of
+    /// the cubes of [`ContactOptions::most`](crate::ContactOptions::most). `None` where the run has
+    /// recorded no forces.
+    pub fn forces(&self, most: usize) -> Option<Vec<FrameForces>> {
+        if self.record.forces().len() == 0 {
+            return None;
+        }
+        let of_frame = |&step: &usize| {
+            let Some((step, forces)) = self.record.latest_forces(step as u64) else {
+                return FrameForces::default();
+            };
+            let drawn = |contact: &tesdf_sim::ContactForce| {
+                let [first, second] = contact.bodies;
+                let sign = if first < second { -1.0 } else { 1.0 };
+                DrawnForce {
+                    point: (contact.point - self.centre).as_vec3(),
+                    force: (sign * contact.force()).as_vec3(),
+                }
+            };
+            let mut arrows: Vec<DrawnForce> = forces.contacts.iter().map(drawn).collect();
+            // A file that was made by hand may have anything.
+            arrows.retain(|arrow| arrow.point.is_finite() && arrow.force.is_finite());
+            let found = arrows.len();
+            arrows.sort_by(|a, b| b.force.length().total_cmp(&a.force.length()));
+            let kept = spread(arrows, |arrow| arrow.point, self.diagonal() / CUBES, most);
+            FrameForces { step: Some(step), found, kept }
+        };
+        Some(self.steps.iter().map(of_frame).collect())
+    }
+}
