@@ -26,6 +26,7 @@ translation = [0, 0, 0.035]
 
 [record]
 contacts_every = 2
+forces_every = 60
 
 [criterion.rest]
 after = 0.1
@@ -73,6 +74,9 @@ def test_a_box_falls_and_lands(scene):
     record = simulation.record()
     assert record.times.shape == (121,) and record.poses.shape == (121, 2, 7) and record.velocities.shape == (121, 2, 6)
     assert np.array_equal(record.poses[-1], simulation.poses) and np.array_equal(record.velocities[-1], simulation.velocities)
+    assert record.force_steps.tolist() == [0, 60] and len(record.joint_forces) == 0
+    last = record.contact_forces.forces[record.contact_force_steps == 60].sum(0)
+    np.testing.assert_allclose(np.abs(last), [0, 0, 0.1 * 0.08 * 0.06 * 1000 * 9.81], rtol=1e-5, atol=1e-4)
     assert record.contact_steps.tolist() == list(range(0, 120, 2)) and set(record.steps) <= set(record.contact_steps)
     assert record.points.shape == (len(record.steps), 3) and record.bodies.max() == 1
     # More steps than the scene's duration.

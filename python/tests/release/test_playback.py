@@ -45,6 +45,9 @@ translation = [999.95, 0, 0.025]
 
 [detector]
 contact_distance = 1e-3
+
+[record]
+forces_every = 10
 """
 # WebGL without a graphics card, and nothing that Chromium itself asks the network for.
 FLAGS = """--no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run
@@ -195,15 +198,24 @@ def test_keys_step_through_the_run(page):
     wait(page, "!document.body.classList.contains('playing')")
 
 
+def test_forces_are_arrows_on_a_body_that_can_be_hidden(page):
+    page.keyboard.press("End")
+    assert "in step 90" in page.inner_text("#force-facts")
+    assert not page.is_checked("#show-contacts")
+    drawn = picture(page)
+    page.keyboard.press("p")
+    assert not page.is_checked("#show-forces")
+    assert changed(drawn, picture(page)) > 30
+
+
 def test_contacts_are_arrows_that_can_be_hidden(page):
     page.keyboard.press("End")
-    with_arrows = picture(page)
+    without = picture(page)
     assert " contact" in page.inner_text("#contact-facts")
     page.click("#show-contacts")
-    without = picture(page)
-    assert changed(with_arrows, without) > 50
+    assert changed(picture(page), without) > 50
     page.keyboard.press("c")
-    assert changed(with_arrows, picture(page)) == 0
+    assert changed(picture(page), without) == 0
 
 
 def test_bodies_have_names_and_can_be_hidden(page):
