@@ -12,6 +12,7 @@ use rayon::ThreadPool;
 use tesdf::Progress;
 use tesdf::collide::Velocity;
 use tesdf::glam::DVec3;
+use tesdf_playback::{LiveView, PlaybackError};
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::{AssetCache, DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{
@@ -49,6 +50,8 @@ pub struct Simulation {
 struct Running {
     engine: Newton,
     run: Run,
+    /// The page that follows the steps.
+    view: Option<LiveView>,
 }
 
 /// Where a scene comes from.
@@ -96,7 +99,7 @@ impl Running {
         };
         let engine = engine.map_err(scene_error)?;
         let run = Run::new(&loaded.scene, engine.system(), run).map_err(Error::Simulate)?;
-        Ok(Self { engine, run })
+        Ok(Self { engine, run, view: None })
     }
 
     fn states(&self) -> &[State] {
@@ -153,13 +156,20 @@ impl Simulation {
         let done = AtomicU64::new(done);
         let work = || {
             pool.install(|| -> Result<(), SimulateError> {
-                let Running { engine, run } = &mut *self.locked();
+                let Running { engine, run, view } = &mut *self.locked();
                 let count = count.unwrap_or(planned.saturating_sub(run.record().steps()));
                 for _ in 0..count {
                     if stop.load(Ordering::Relaxed) {
                         break;
                     }
-                    done.store(run.step(engine)?.step, Ordering::Relaxed);
+                    let moment = run.step(engine)?;
+                    done.store(moment.step, Ordering::Relaxed);
+                    if let Some(live) = view
+                        && live.show(&moment).is_err()
+                    {
+                        // A state that no page can draw ends the page, not the run.
+                        *view = None;
+                    }
                 }
                 Ok(())
             })
@@ -305,6 +315,24 @@ impl Simulation {
             .with("joint_forces", forces::of_joints(py, &joints)?)?
             .with("warnings", classes::dict(py, &record.warnings())?)?
             .build("Record")
+    }
+
+    /// Serves a page on this machine that follows the steps from now on, until the simulation is
+    /// deleted: LiveView, whose open() shows it in a browser, and which a notebook shows. title is its
+    /// heading.
+    ///
+    /// Raises SimulationError where the machine has no loopback interface.
+    #[pyo3(signature = (*, title = "simulation"))]
+    fn view<'py>(&self, py: Python<'py>, title: &str) -> PyResult<Bound<'py, PyAny>> {
+        let url = py.detach(|| -> Result<String, PlaybackError> {
+            let Running { engine, view, .. } = &mut *self.locked();
+            if view.is_none() {
+                *view = Some(LiveView::open(engine.system(), title)?);
+            }
+            Ok(view.as_ref().map(LiveView::url).unwrap_or_default())
+        });
+        let url = url.map_err(|e| Error::Playback(e).raise(py))?;
+        py.import("tesdf.playback")?.getattr("LiveView")?.call1((url,))
     }
 
     /// Names of the bodies.

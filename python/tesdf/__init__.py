@@ -87,7 +87,7 @@ from .errors import (
     SceneError,
     SimulationError,
 )
-from .playback import export
+from .playback import LiveView, export
 from .reports import (
     CheckReport,
     Clearance,
@@ -134,6 +134,7 @@ __all__ = [
     "InstancePairs",
     "Instances",
     "JointForces",
+    "LiveView",
     "MeshError",
     "Moved",
     "NotSolidError",

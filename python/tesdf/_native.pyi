@@ -21,6 +21,7 @@ from .contacts import (
     StepContacts,
     TouchingFeatures,
 )
+from .playback import LiveView
 from .reports import (
     Certificate,
     CheckReport,
@@ -381,6 +382,7 @@ class Simulation:
     def summary(self) -> dict[str, Any]: ...
     def save(self, path: _Path) -> None: ...
     def record(self) -> Record: ...
+    def view(self, *, title: str = "simulation") -> LiveView: ...
     def set_motor(
         self,
         joint: str | int,

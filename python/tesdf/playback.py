@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import tempfile
+import webbrowser
 from collections.abc import Mapping
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Union
@@ -11,6 +13,25 @@ from typing import Union
 from . import _native
 
 _Path = Union[str, "PathLike[str]"]
+
+
+@dataclass(frozen=True)
+class LiveView:
+    """A page on this machine that follows the steps of a simulation: `Simulation.view`.
+
+    A notebook on the same machine shows it as the value of a cell.
+    """
+
+    url: str
+    """its address, such as http://127.0.0.1:41234/"""
+
+    def open(self) -> None:
+        """Opens the page in the browser of the user. Raises RuntimeError where none can be started."""
+        if not webbrowser.open(self.url):
+            raise RuntimeError(f"no browser can be started here; open {self.url} in one on this machine")
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.url}" width="100%" height="520" style="border: 0"></iframe>'
 
 
 def export(

@@ -3,6 +3,7 @@
 import json
 import os
 import subprocess
+import urllib.request
 
 import numpy as np
 import pytest
@@ -281,3 +282,21 @@ def test_an_exception_of_progress_ends_a_run(scene):
 def test_ctrl_c_ends_a_run(scene):
     body = ["simulation = tesdf.Simulation(sys.argv[1], duration=1000)", "print('started', flush=True)", "simulation.run()"]
     ended_by_ctrl_c(body, scene)
+
+
+def test_a_page_follows_the_steps(scene):
+    simulation = tesdf.Simulation(scene)
+    view = simulation.view(title="drop")
+    assert view == simulation.view() and view.url in view._repr_html_()
+    with urllib.request.urlopen(view.url, timeout=60) as page:
+        assert "<h1>drop</h1>" in page.read().decode()
+    simulation.step()
+    with urllib.request.urlopen(view.url + "frames", timeout=60) as frames:
+        lines = [frames.readline().decode() for _ in range(2)]
+    assert lines[0] == "id: 0\n"
+    frame = json.loads(lines[1].removeprefix("data: "))
+    assert frame["step"] == 1 and len(frame["poses"]) == 7 * len(simulation.bodies)
+    del simulation
+    with pytest.raises(OSError, match="refused"):
+        for _ in range(100):
+            urllib.request.urlopen(view.url, timeout=60).close()

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::Progress;
+use tesdf_playback::LiveView;
 use tesdf_sim::criterion::Criteria;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{AssetCache, DetectorMode, LoadedScene, SceneError};
-use tesdf_sim::{InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
+use tesdf_sim::{Dynamics, InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
 use crate::collide::warn_of_coarse;
 use crate::terminal::device::{self, Choice, Device};
@@ -66,6 +67,10 @@ pub struct Args {
     /// user's folder for caches, or that of the environment variable TESDF_CACHE
     #[arg(long)]
     pub no_cache: bool,
+    /// Serve a page on this machine that follows the run. Its address is printed on stderr. After the
+    /// run it is served until Ctrl-C
+    #[arg(long)]
+    pub view: bool,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
@@ -165,10 +170,16 @@ pub fn run_with(
         None => loaded.newton(system),
     };
     let mut engine = engine.map_err(Failure::new)?;
+    let mut live = args.view.then(|| follow(args, engine.system())).transpose()?;
     let bar = LiveProgress::new(&interrupted);
     let mut recorder = Recorder::new(&output, &origin, earlier.as_ref());
     let ended = simulate_from(&loaded.scene, &mut engine, begun, |moment| {
         recorder.push(moment)?;
+        if let Some(live) = &mut live {
+            let shown = if moment.step == moment.steps { live.end(moment) } else { live.show(moment) };
+            // The run goes on without its page.
+            shown.unwrap_or_else(|e| report::warning(&e.to_string()));
+        }
         bar.show(moment)
     });
     drop(bar);
@@ -176,8 +187,22 @@ pub fn run_with(
     recorder.finish(&record)?;
     warn_of(&summary, loaded.scene.detector.name());
     print(args, &summary)?;
+    if live.is_some() {
+        report::note("the run has ended; its page is served until Ctrl-C");
+        while !interrupted.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
     let is_refused = args.strict && !summary.warnings.is_empty();
     Ok(if is_refused || summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
+}
+
+/// Serves the page of the run.
+fn follow(args: &Args, system: &System) -> Result<LiveView, Failure> {
+    let title = args.source().file_stem().unwrap_or_default().to_string_lossy();
+    let live = LiveView::open(system, &title).map_err(Failure::new)?;
+    report::note(&format!("the run is shown at {}", live.url()));
+    Ok(live)
 }
 
 fn open_interrupted(run: &Path) -> Result<InterruptedRun, Failure> {

@@ -46,6 +46,9 @@ pub enum PlaybackError {
         /// How to get a smaller one.
         hint: &'static str,
     },
+    /// A page cannot be served on this machine.
+    #[error("a page cannot be served on the loopback interface: {0}")]
+    Serve(String),
     /// The result cannot be encoded.
     #[error("the result cannot be encoded: {0}")]
     Encode(String),

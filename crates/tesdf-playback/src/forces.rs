@@ -1,5 +1,6 @@
 //! The forces of a run's frames.
-use tesdf::glam::Vec3;
+use tesdf::glam::{DVec3, Vec3};
+use tesdf_sim::ContactForce;
 
 use crate::Playback;
 use crate::contacts::{CUBES, spread};
@@ -37,22 +38,29 @@ impl Playback<'_> {
             let Some((step, forces)) = self.record.latest_forces(step as u64) else {
                 return FrameForces::default();
             };
-            let drawn = |contact: &tesdf_sim::ContactForce| {
-                let [first, second] = contact.bodies;
-                let sign = if first < second { -1.0 } else { 1.0 };
-                DrawnForce {
-                    point: (contact.point - self.centre).as_vec3(),
-                    force: (sign * contact.force()).as_vec3(),
-                }
-            };
-            let mut arrows: Vec<DrawnForce> = forces.contacts.iter().map(drawn).collect();
-            // A file that was made by hand may have anything.
-            arrows.retain(|arrow| arrow.point.is_finite() && arrow.force.is_finite());
-            let found = arrows.len();
-            arrows.sort_by(|a, b| b.force.length().total_cmp(&a.force.length()));
-            let kept = spread(arrows, |arrow| arrow.point, self.diagonal() / CUBES, most);
+            let (found, kept) = drawn(&forces.contacts, self.centre, self.diagonal(), most);
             FrameForces { step: Some(step), found, kept }
         };
         Some(self.steps.iter().map(of_frame).collect())
     }
+}
+
+/// The number of forces, and those that are drawn, around `centre`.
+pub(crate) fn drawn(
+    contacts: &[ContactForce],
+    centre: DVec3,
+    diagonal: f64,
+    most: usize,
+) -> (usize, Vec<DrawnForce>) {
+    let arrow = |contact: &ContactForce| {
+        let [first, second] = contact.bodies;
+        let sign = if first < second { -1.0 } else { 1.0 };
+        DrawnForce { point: (contact.point - centre).as_vec3(), force: (sign * contact.force()).as_vec3() }
+    };
+    let mut arrows: Vec<DrawnForce> = contacts.iter().map(arrow).collect();
+    // A file that was made by hand may have anything.
+    arrows.retain(|arrow| arrow.point.is_finite() && arrow.force.is_finite());
+    let found = arrows.len();
+    arrows.sort_by(|a, b| b.force.length().total_cmp(&a.force.length()));
+    (found, spread(arrows, |arrow| arrow.point, diagonal / CUBES, most))
 }

@@ -11,6 +11,7 @@
 //! - [`Playback::contacts`]: the contacts of each frame, recorded or detected again.
 //! - [`Playback::forces`]: the recorded forces of each frame.
 //! - [`page()`]: a page that plays the run in a browser, without a server.
+//! - [`LiveView`]: a page that follows a run while it is made.
 //!
 //! Units are SI: metres, seconds. Everything is deterministic: the same run gives the same bytes.
 #![warn(missing_docs)]
@@ -21,6 +22,7 @@ mod error;
 mod forces;
 mod frames;
 mod glb;
+mod live;
 mod mesh;
 mod normals;
 mod page;
@@ -33,6 +35,7 @@ pub use error::PlaybackError;
 pub use forces::{DrawnForce, FrameForces};
 pub use frames::Frames;
 pub use glb::{GlbOptions, glb};
+pub use live::LiveView;
 pub use mesh::Mesh;
 pub use normals::SmoothNormals;
 pub use page::{Arrows, page};

@@ -127,11 +127,7 @@ impl<'a> Playback<'a> {
     /// [`PlaybackError::State`], with the step and the body.
     pub fn track(&self, body: usize) -> Result<Vec<Pose>, PlaybackError> {
         let mut track: Vec<Pose> = Vec::with_capacity(self.steps.len());
-        let drawn = &self.bodies[body];
-        let origin = match drawn.part {
-            Part::Mesh(mesh) => self.meshes[mesh].middle * drawn.scale,
-            Part::Floor(at) => at,
-        };
+        let origin = self.origin(body);
         for &step in &self.steps {
             let mut pose = pose(self.record, step, body)?;
             pose.translation = pose.to_world(origin) - self.centre;
@@ -144,6 +140,15 @@ impl<'a> Playback<'a> {
             track.push(pose);
         }
         Ok(track)
+    }
+
+    /// The origin of a body's mesh, or the middle of its floor, in the body's frame, m.
+    pub(crate) fn origin(&self, body: usize) -> DVec3 {
+        let drawn = &self.bodies[body];
+        match drawn.part {
+            Part::Mesh(mesh) => self.meshes[mesh].middle * drawn.scale,
+            Part::Floor(at) => at,
+        }
     }
 
     fn state(&self, step: usize, body: usize, reason: String) -> PlaybackError {
@@ -183,9 +188,14 @@ pub(crate) fn pose(record: &RunRecord, step: usize, body: usize) -> Result<Pose,
         PlaybackError::State { body, step, reason }
     };
     let pose = record.pose(step, body).ok_or_else(|| failure("it is missing".into()))?;
-    let pose = Pose::new(pose.translation, pose.rotation).map_err(|e| failure(e.to_string()))?;
+    checked(pose).map_err(failure)
+}
+
+/// A pose that can be drawn, or why it cannot.
+pub(crate) fn checked(pose: Pose) -> Result<Pose, String> {
+    let pose = Pose::new(pose.translation, pose.rotation).map_err(|e| e.to_string())?;
     match pose.translation.abs().max_element() > MOST {
-        true => Err(failure(format!("it is {} m away", pose.translation.length()))),
+        true => Err(format!("it is {} m away", pose.translation.length())),
         false => Ok(pose),
     }
 }

@@ -10,7 +10,7 @@ use crate::scene_file::{LimitError, RecordSection, SceneFile};
 use crate::script::Scripts;
 use crate::totals::Totals;
 use crate::warning::{Warning, Watch, energies};
-use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, State, StepReport, System};
+use crate::{Dynamics, DynamicsError, Forces, HiddenPair, RunRecord, State, StepReport, System};
 
 /// Summary of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -80,6 +80,8 @@ pub struct Moment<'a> {
     pub report: StepReport,
     /// The bodies after the step.
     pub system: &'a System,
+    /// The forces of the step; `None` from an engine that does not tell.
+    pub forces: Option<&'a Forces>,
     /// The run so far, including this step.
     pub record: &'a RunRecord,
 }
@@ -300,7 +302,8 @@ impl Run {
         self.record.push_hidden(step, engine.hidden(), system);
         self.record.tell(self.watch.so_far(system, &self.totals));
         self.overlap = OnceLock::new();
-        Ok(Moment { step: step + 1, steps: self.steps, time, report, system, record: &self.record })
+        let (steps, forces) = (self.steps, engine.forces());
+        Ok(Moment { step: step + 1, steps, time, report, system, forces, record: &self.record })
     }
 
     /// Whether all steps of the scene's duration are made.

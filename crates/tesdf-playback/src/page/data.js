@@ -34,7 +34,8 @@ async function readRun() {
   }
   const frames = run.times.length;
   for (const body of run.bodies) {
-    body.track = floats(take(7 * frames));
+    const columns = floats(take(7 * frames));
+    body.track = columns.map((_, at) => columns[(at % 7) * frames + Math.floor(at / 7)]);
   }
   if (run.contacts) {
     const { contacts } = run;
@@ -51,8 +52,11 @@ async function readRun() {
     forces.starts = take(frames + 1);
     forces.found = take(frames);
     const count = forces.starts[frames];
-    forces.points = floats(take(3 * count));
-    forces.vectors = floats(take(3 * count));
+    const [points, vectors] = [floats(take(3 * count)), floats(take(3 * count))];
+    const of = (all, frame) => all.subarray(3 * forces.starts[frame], 3 * forces.starts[frame + 1]);
+    forces.frames = run.times.map((_, k) => {
+      return { step: forces.steps[k], found: forces.found[k], points: of(points, k), vectors: of(vectors, k) };
+    });
   }
   return run;
 }
@@ -69,11 +73,35 @@ function ofOctahedron(x, y) {
   return [x / length, y / length, z / length];
 }
 
+// A run that is still made: each message has a frame. Calls back after each one, and at the end.
+function follow(run, grown) {
+  const begin = run.bodies.map((body) => [...body.track]);
+  run.bodies.forEach((body, number) => (body.track = begin[number]));
+  run.forces = { frames: [{ step: null, found: 0, points: [], vectors: [] }], greatest: 0 };
+  const source = new EventSource("frames");
+  source.addEventListener("message", ({ data }) => {
+    const { time, step, poses, forces } = JSON.parse(data);
+    run.times.push(time);
+    run.steps.push(step);
+    run.bodies.forEach((body, number) => body.track.push(...poses.slice(7 * number, 7 * number + 7)));
+    const { points, vectors, found } = forces ?? { points: [], vectors: [], found: 0 };
+    run.forces.frames.push({ step: step - 1, found, points, vectors });
+    // The greatest one comes first.
+    run.forces.greatest = Math.max(run.forces.greatest, Math.hypot(...vectors.slice(0, 3)));
+    grown("The run is being made.");
+  });
+  source.addEventListener("error", () => grown("The program that makes the run does not answer."));
+  source.addEventListener("end", () => {
+    source.close();
+    grown("The run has ended.");
+  });
+}
+
 // Pose of a body between two frames: position relative to the centre of the run, and quaternion.
 function poseAt(body, frames, frame, share) {
   const track = body.track;
   const next = Math.min(frame + 1, frames - 1);
-  const value = (k) => track[k * frames + frame] * (1 - share) + track[k * frames + next] * share;
+  const value = (k) => track[7 * frame + k] * (1 - share) + track[7 * next + k] * share;
   const position = [value(0), value(1), value(2)];
   const turn = [value(3), value(4), value(5), value(6)];
   const length = Math.hypot(...turn) || 1;

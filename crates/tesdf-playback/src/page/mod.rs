@@ -39,6 +39,29 @@ pub struct Arrows<'a> {
 /// # Errors
 /// [`PlaybackError`]: a state is not valid, or the page would be larger than 400 MB.
 pub fn page(run: &Playback<'_>, arrows: Arrows<'_>, title: &str) -> Result<String, PlaybackError> {
+    filled_page(run, arrows, title, Source::File)
+}
+
+/// The page of a run at its beginning, which asks its server for what follows.
+pub(crate) fn live(run: &Playback<'_>, title: &str) -> Result<String, PlaybackError> {
+    filled_page(run, Arrows::default(), title, Source::Server)
+}
+
+/// Where a page gets its frames from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Source {
+    /// They are all in it.
+    File,
+    /// The server that sent the page.
+    Server,
+}
+
+fn filled_page(
+    run: &Playback<'_>,
+    arrows: Arrows<'_>,
+    title: &str,
+    source: Source,
+) -> Result<String, PlaybackError> {
     let mut numbers = Numbers::default();
     let meshes: Vec<Value> = run
         .meshes
@@ -71,6 +94,7 @@ pub fn page(run: &Playback<'_>, arrows: Arrows<'_>, title: &str) -> Result<Strin
     let around = |p: DVec3| (p - run.centre).to_array();
     let warnings: Vec<String> = run.record.warnings().into_iter().map(|warning| warning.message).collect();
     let about = json!({
+        "is_live": source == Source::Server,
         "warnings": warnings,
         "times": run.times, "steps": run.steps, "meshes": meshes, "bodies": bodies, "contacts": contacts,
         "forces": forces,
@@ -82,6 +106,7 @@ pub fn page(run: &Playback<'_>, arrows: Arrows<'_>, title: &str) -> Result<Strin
     let title = title.replace('&', "&amp;").replace('<', "&lt;");
     let parts = [
         ("title", &*title),
+        ("policy", if source == Source::Server { "; connect-src 'self'" } else { "" }),
         ("style", STYLE),
         ("run", &about),
         ("data", &numbers.to_text()?),
@@ -161,7 +186,7 @@ mod tests {
         assert_eq!(filled("a{{x}}b{{y}}c{{x}}", &[("x", "{{y}}"), ("y", "1")]), "a{{y}}b1c{{y}}");
         let names: Vec<&str> =
             TEMPLATE.split("{{").skip(1).map(|rest| rest.split_once("}}").unwrap().0).collect();
-        assert_eq!(names, ["title", "style", "title", "run", "data", "script"]);
+        assert_eq!(names, ["policy", "title", "style", "title", "run", "data", "script"]);
         assert!(!SCRIPT.contains("</") && !STYLE.contains("</"));
     }
 

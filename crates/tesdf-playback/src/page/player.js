@@ -18,10 +18,25 @@ class Player {
     for (let k = 0; k < 8; k++) {
       this.corners.push([0, 1, 2].map((axis) => run.bounds[(k >> axis) & 1][axis]));
     }
+    if (run.is_live) this.follow();
     this.fillLists();
     this.listen();
     this.fit();
     this.show();
+  }
+
+  // A run that is still made: at its end, the time goes on with it.
+  follow() {
+    const { run } = this;
+    element("live").hidden = false;
+    let end = run.times.at(-1);
+    follow(run, (state) => {
+      element("live").textContent = state;
+      element("slider").max = run.times.length - 1;
+      if (!this.playing && this.time >= end) this.time = run.times.at(-1);
+      end = run.times.at(-1);
+      this.show();
+    });
   }
 
   fit() {
@@ -81,7 +96,7 @@ class Player {
     const { times } = this.run;
     this.time += seconds * SPEEDS[element("speed").selectedIndex];
     if (this.time < times.at(-1)) return;
-    if (element("loop").checked && this.seconds > 0) {
+    if (element("loop").checked && !this.run.is_live && this.seconds > 0) {
       this.time = times[0] + ((this.time - times[0]) % this.seconds);
     } else {
       this.time = times.at(-1);
@@ -129,13 +144,14 @@ class Player {
   }
 
   writeForces(frame) {
-    const { starts, found, steps, vectors, greatest } = this.run.forces;
-    const [first, shown] = [starts[frame], starts[frame + 1] - starts[frame]];
-    const parts = [found[frame] === 1 ? "1 force" : `${found[frame]} forces`];
-    if (steps[frame] !== null) parts[0] += ` in step ${steps[frame]}`;
-    if (shown < found[frame]) parts.push(`${shown} drawn`);
+    const { frames, greatest } = this.run.forces;
+    const { step, found, vectors } = frames[frame];
+    const shown = vectors.length / 3;
+    const parts = [found === 1 ? "1 force" : `${found} forces`];
+    if (step !== null) parts[0] += ` in step ${step}`;
+    if (shown < found) parts.push(`${shown} drawn`);
     // The greatest one of a frame comes first.
-    if (shown > 0) parts.push(`greatest ${forceText(Math.hypot(...vectors.subarray(3 * first, 3 * first + 3)))}`);
+    if (shown > 0) parts.push(`greatest ${forceText(Math.hypot(...vectors.slice(0, 3)))}`);
     element("force-facts").textContent = `${parts.join(", ")}; the longest arrow is ${forceText(greatest)}`;
   }
 
@@ -166,7 +182,8 @@ class Player {
     element("slider").max = times.length - 1;
     const names = SPEEDS.map((speed) => `${speed} ×`);
     element("speed").append(...names.map((name) => new Option(name)));
-    const slow = SPEEDS.findLastIndex((speed) => this.seconds / speed >= LEAST_SECONDS);
+    // The duration of a run that is still made is not known.
+    const slow = this.run.is_live ? SPEEDS.length : SPEEDS.findLastIndex((speed) => this.seconds / speed >= LEAST_SECONDS);
     element("speed").selectedIndex = Math.min(Math.max(slow, 0), SPEEDS.indexOf(1));
     element("forces").hidden = !this.run.forces;
     if (!contacts) return;

@@ -295,10 +295,11 @@ class Scene {
   }
 
   forceArrows(frame) {
-    const { starts, points, vectors, greatest } = this.run.forces;
+    const { frames, greatest } = this.run.forces;
+    const { points, vectors } = frames[frame];
     const arrows = [];
-    for (let k = starts[frame]; k < starts[frame + 1]; k++) {
-      const [point, force] = [points, vectors].map((all) => [...all.subarray(3 * k, 3 * k + 3)]);
+    for (let k = 0; k < points.length; k += 3) {
+      const [point, force] = [points, vectors].map((all) => [...all.slice(k, k + 3)]);
       const vector = force.map((x) => (FORCE_LENGTH * x) / greatest);
       if (dot(vector, vector) > 0) arrows.push(...point, ...vector, ...FORCE_COLOUR);
     }

@@ -1,4 +1,5 @@
 //! The tests of `tesdf-playback` over several of its modules, in one program.
 mod glb;
+mod live;
 mod page;
 mod support;

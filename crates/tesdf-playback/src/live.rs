@@ -1,0 +1,243 @@
+//! A page that follows a run while it is made.
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+use tesdf::glam::{DQuat, DVec3};
+use tesdf_sim::{Moment, RunRecord, System};
+
+use crate::forces::{DrawnForce, drawn};
+use crate::page;
+use crate::playback::checked;
+use crate::{ContactOptions, Frames, Playback, PlaybackError};
+
+/// Least wall time between two frames: browsers draw no more than 60 a second.
+const PAUSE: Duration = Duration::from_millis(16);
+/// Longest head of a request, bytes.
+const HEAD: u64 = 16_384;
+/// How long a browser may take to send a request.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Most connections at a time.
+const MOST: usize = 32;
+
+/// A page on this machine that follows a run while it is made. It is served on the loopback
+/// interface alone, until this value is dropped; pages that are open then keep what they have.
+#[derive(Debug)]
+pub struct LiveView {
+    address: SocketAddr,
+    shared: Arc<Shared>,
+    /// The middle of the page, m, world frame, and the diagonal of the bodies, m.
+    centre: DVec3,
+    diagonal: f64,
+    /// What each body's pose is told of, in its frame, m.
+    origins: Vec<DVec3>,
+    /// Rotations of the last frame.
+    rotations: Vec<DQuat>,
+    last: Option<Instant>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    page: String,
+    sent: Mutex<Sent>,
+    grown: Condvar,
+    connections: AtomicUsize,
+}
+
+/// What pages are sent.
+#[derive(Debug, Default)]
+struct Sent {
+    frames: Vec<String>,
+    has_ended: bool,
+    is_closed: bool,
+}
+
+impl LiveView {
+    /// Serves a page with the present state of `system`. `title` is its heading.
+    ///
+    /// # Errors
+    /// [`PlaybackError::State`] for a state that is not valid, [`PlaybackError::Serve`] where the
+    /// machine has no loopback interface.
+    pub fn open(system: &System, title: &str) -> Result<Self, PlaybackError> {
+        let begin = RunRecord::new(system, serde_json::Value::Null);
+        let run = Playback::new(&begin, system, Frames::default())?;
+        let serve = |e: std::io::Error| PlaybackError::Serve(e.to_string());
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(serve)?;
+        let address = listener.local_addr().map_err(serve)?;
+        let shared = Arc::new(Shared { page: page::live(&run, title)?, ..Shared::default() });
+        let served = Arc::clone(&shared);
+        let accept = move || accept(&listener, address, &served);
+        thread::Builder::new().name("live view".into()).spawn(accept).map_err(serve)?;
+        let origins: Vec<DVec3> = (0..run.bodies.len()).map(|body| run.origin(body)).collect();
+        let rotations = vec![DQuat::IDENTITY; origins.len()];
+        let (centre, diagonal) = (run.centre, run.diagonal());
+        Ok(Self { address, shared, centre, diagonal, origins, rotations, last: None })
+    }
+
+    /// The address of the page, such as `http://127.0.0.1:41234/`.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.address)
+    }
+
+    /// Shows the bodies after a step, and its forces. States that follow each other within 16 ms of
+    /// wall time are left out.
+    ///
+    /// # Errors
+    /// [`PlaybackError::State`] for a state that is not valid.
+    pub fn show(&mut self, moment: &Moment<'_>) -> Result<(), PlaybackError> {
+        if self.last.is_some_and(|last| last.elapsed() < PAUSE) {
+            return Ok(());
+        }
+        self.last = Some(Instant::now());
+        let Moment { step, time, system, forces, .. } = *moment;
+        let mut poses = Vec::with_capacity(7 * self.origins.len());
+        for (body, state) in system.states().iter().enumerate().take(self.origins.len()) {
+            let pose = checked(state.pose).map_err(|reason| PlaybackError::State {
+                body: system.bodies()[body].name.clone(),
+                step: step as usize,
+                reason,
+            })?;
+            let before = &mut self.rotations[body];
+            *before = if before.dot(pose.rotation) < 0.0 { -pose.rotation } else { pose.rotation };
+            let at = pose.to_world(self.origins[body]) - self.centre;
+            poses.extend(at.as_vec3().to_array());
+            poses.extend(before.as_quat().to_array());
+        }
+        let forces = forces.map(|forces| {
+            let (found, kept) = drawn(&forces.contacts, self.centre, self.diagonal, ContactOptions::MOST);
+            let all = |of: fn(&DrawnForce) -> [f32; 3]| kept.iter().flat_map(of).collect::<Vec<f32>>();
+            json!({
+                "found": found,
+                "points": all(|force| force.point.to_array()),
+                "vectors": all(|force| force.force.to_array()),
+            })
+        });
+        let frame = json!({ "time": time, "step": step, "poses": poses, "forces": forces }).to_string();
+        self.shared.sent().frames.push(frame);
+        self.shared.grown.notify_all();
+        Ok(())
+    }
+
+    /// As [`show`](Self::show), but of the last step: the page then says that the run has ended.
+    ///
+    /// # Errors
+    /// [`PlaybackError::State`] for a state that is not valid.
+    pub fn end(&mut self, moment: &Moment<'_>) -> Result<(), PlaybackError> {
+        self.last = None;
+        self.show(moment)?;
+        self.shared.sent().has_ended = true;
+        self.shared.grown.notify_all();
+        Ok(())
+    }
+}
+
+impl Drop for LiveView {
+    fn drop(&mut self) {
+        self.shared.sent().is_closed = true;
+        self.shared.grown.notify_all();
+        // The thread that accepts connections waits for one.
+        drop(TcpStream::connect_timeout(&self.address, PATIENCE));
+    }
+}
+
+impl Shared {
+    fn sent(&self) -> MutexGuard<'_, Sent> {
+        self.sent.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The frames from number `next` on, once there are any or after some seconds, and whether there
+    /// will be more.
+    fn wait(&self, next: usize) -> (Vec<String>, bool) {
+        let waits = |sent: &mut Sent| sent.frames.len() <= next && !sent.has_ended && !sent.is_closed;
+        let waited = self.grown.wait_timeout_while(self.sent(), PATIENCE, waits);
+        let (sent, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let frames = sent.frames.get(next..).unwrap_or_default().to_vec();
+        (frames, !sent.has_ended && !sent.is_closed)
+    }
+}
+
+/// Answers until the view is closed.
+fn accept(listener: &TcpListener, address: SocketAddr, shared: &Arc<Shared>) {
+    for stream in listener.incoming() {
+        if shared.sent().is_closed {
+            return;
+        }
+        let Ok(stream) = stream else { continue };
+        let for_thread = Arc::clone(shared);
+        if shared.connections.fetch_add(1, Ordering::Relaxed) >= MOST {
+            shared.connections.fetch_sub(1, Ordering::Relaxed);
+            continue;
+        }
+        let answer = move || {
+            // A browser that has gone away is no error.
+            drop(answer(&stream, address, &for_thread));
+            for_thread.connections.fetch_sub(1, Ordering::Relaxed);
+        };
+        if thread::Builder::new().name("live view".into()).spawn(answer).is_err() {
+            shared.connections.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Answers one request.
+fn answer(mut stream: &TcpStream, address: SocketAddr, shared: &Shared) -> std::io::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_nodelay(true)?;
+    let mut lines = BufReader::new(stream.take(HEAD)).lines();
+    let request = lines.next().transpose()?.unwrap_or_default();
+    let (mut host, mut next) = (String::new(), 0);
+    for line in lines {
+        let line = line?;
+        let Some((key, value)) = line.split_once(':') else { break };
+        match &*key.to_ascii_lowercase() {
+            "host" => host = value.trim().to_string(),
+            "last-event-id" => next = value.trim().parse::<usize>().map_or(0, |last| last + 1),
+            _ => {}
+        }
+    }
+    // A page of another site could ask under a name that leads here.
+    let port = address.port();
+    if host != format!("127.0.0.1:{port}") && host != format!("localhost:{port}") {
+        return write!(stream, "HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+    }
+    match request.split(' ').take(2).collect::<Vec<_>>()[..] {
+        ["GET", "/"] => write!(
+            stream,
+            "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{}",
+            shared.page.len(),
+            shared.page
+        ),
+        ["GET", "/frames"] => stream_frames(stream, shared, next),
+        _ => write!(stream, "HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"),
+    }
+}
+
+/// Sends the frames from number `next` on as server-sent events.
+fn stream_frames(mut stream: &TcpStream, shared: &Shared, mut next: usize) -> std::io::Result<()> {
+    write!(
+        stream,
+        "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n"
+    )?;
+    loop {
+        let (frames, goes_on) = shared.wait(next);
+        let mut text = String::new();
+        for frame in &frames {
+            text += &format!("id: {next}\ndata: {frame}\n\n");
+            next += 1;
+        }
+        match goes_on {
+            // A comment finds out whether the browser is still there.
+            true if frames.is_empty() => text += ":\n\n",
+            true => {}
+            false => text += "event: end\ndata: \n\n",
+        }
+        stream.write_all(text.as_bytes())?;
+        if !goes_on {
+            return Ok(());
+        }
+    }
+}
