@@ -355,3 +355,24 @@ def test_options_and_errors(folder, tmp_path):
         tesdf.view(3, out)
     with pytest.raises(ValueError, match="geometries: given for a Simulation"):
         tesdf.view(tesdf.Simulation(folder / "scene.toml"), out, geometries={})
+
+
+def test_a_live_page_follows_the_steps_and_stays_when_they_end(tab, folder):
+    simulation = tesdf.Simulation(folder / "scene.toml")
+    view = simulation.view(title="live")
+    tab.goto(view.url)
+    tab.wait_for_selector("body.ready")
+    first = picture(tab)
+    for _ in range(100):
+        simulation.step()
+        tab.wait_for_timeout(5)
+    wait(tab, "element('facts').textContent.includes('step 9')")
+    assert "being made" in tab.inner_text("#live")
+    assert " force" in tab.inner_text("#force-facts") and "N" in tab.inner_text("#force-facts")
+    assert changed(first, picture(tab)) > 100
+    del simulation
+    wait(tab, "document.getElementById('live').textContent.includes('ended')")
+    # What was sent remains, and plays.
+    tab.keyboard.press("Home")
+    assert "step 0" in tab.inner_text("#facts")
+    assert {address.removeprefix(view.url) for address in tab.asked} <= {"", "frames"}

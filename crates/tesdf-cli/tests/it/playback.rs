@@ -102,3 +102,38 @@ fn a_run_becomes_a_page() {
     let (code, _, err) = folder.tesdf(&["view", "run", "-o", "run"]);
     assert!(code == Some(2) && err.contains("is the input run itself"), "{err}");
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_page_follows_a_run_and_is_served_until_ctrl_c() {
+    use std::io::{BufRead, BufReader, Read, Write};
+    use std::net::TcpStream;
+    use std::process::{Command, Stdio};
+    let folder = Folder::new();
+    folder.write("drop.toml", DROP);
+    let mut child = folder
+        .command(&["simulate", "drop.toml", "-o", "run", "--view"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut notes = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let address = notes.find_map(|line| {
+        let (_, url) = line.split_once("the run is shown at http://")?;
+        Some(url.trim_end_matches('/').to_string())
+    });
+    let address = address.unwrap();
+    let mut stream = TcpStream::connect(&address).unwrap();
+    write!(stream, "GET /frames HTTP/1.1\r\nHost: {address}\r\n\r\n").unwrap();
+    let mut events = String::new();
+    stream.read_to_string(&mut events).unwrap();
+    assert!(events.contains("\"step\":20,") && events.ends_with("event: end\ndata: \n\n"), "{events}");
+    assert!(notes.any(|line| line.contains("the run has ended")));
+    assert_eq!(child.try_wait().unwrap(), None);
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let (code, out, _) = crate::folder::texts(child.wait_with_output().unwrap());
+    assert!(code == Some(0) && out.contains("20 steps"), "{code:?} {out}");
+    // The run is that of the command without a page.
+    folder.good(&["simulate", "drop.toml", "-o", "plain"]);
+    assert!(std::fs::read(folder.path("run")).unwrap() == std::fs::read(folder.path("plain")).unwrap());
+}
