@@ -106,6 +106,7 @@ fn rigid_body(number: usize, body: &Body, state: &State, options: &RapierOptions
             ))
             .linvel(state.linear)
             .angvel(state.angular)
+            .linear_damping(body.linear_damping)
             .angular_damping(body.angular_damping)
             .soft_ccd_prediction(options.speculative_distance)
             .can_sleep(false),

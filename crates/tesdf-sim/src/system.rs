@@ -30,8 +30,10 @@ pub struct Body {
     pub friction: f64,
     /// Coefficient of restitution, see [`System::restitution`].
     pub restitution: f64,
-    /// Rate at which the angular velocity of a free body decays, 1/s: in a step of h seconds, it is
-    /// divided by 1 + h times this.
+    /// Rate at which the velocity of a free body's centre of mass decays, 1/s: in a step of h
+    /// seconds, it is divided by 1 + h times this before forces act.
+    pub linear_damping: f64,
+    /// Likewise of its angular velocity, 1/s.
     pub angular_damping: f64,
 }
 
@@ -140,6 +142,7 @@ impl System {
             mass,
             friction: 0.0,
             restitution: 0.0,
+            linear_damping: 0.0,
             angular_damping: 0.0,
         });
         self.states.push(state);
@@ -310,6 +313,16 @@ impl System {
     /// Whether a body has a restitution.
     pub(crate) fn has_restitution(&self) -> bool {
         self.bodies.iter().any(|body| body.restitution > 0.0)
+    }
+
+    /// Sets the [linear damping](Body::linear_damping) of a body, 1/s.
+    ///
+    /// # Errors
+    /// The same errors as [`set_friction`](Self::set_friction).
+    pub fn set_linear_damping(&mut self, body: usize, damping: f64) -> Result<(), DynamicsError> {
+        self.body(body)?;
+        self.bodies[body].linear_damping = not_negative("linear_damping", damping)?;
+        Ok(())
     }
 
     /// Sets the [angular damping](Body::angular_damping) of a body, 1/s.

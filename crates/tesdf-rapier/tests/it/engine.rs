@@ -261,22 +261,25 @@ fn friction_holds_a_box_that_gravity_or_a_wrench_pulls() {
 }
 
 #[test]
-fn damping_slows_a_rotation() {
+fn damping_slows_a_motion_and_a_rotation() {
     let shape = Shape::Sphere { radius: 0.02 };
     let mass = Mass::Free(steel(&shape));
     let mut system = System::new(DVec3::ZERO);
     let body = add(&mut system, "ball", shape, Pose::at(DVec3::ZERO), mass);
     system.set_angular_damping(body, 2.0).expect("a rate");
-    let spin = DVec3::new(0.0, 0.0, 5.0);
-    let state = State { angular: spin, ..system.states()[body] };
+    system.set_linear_damping(body, 3.0).expect("a rate");
+    let (way, spin) = (DVec3::new(0.1, 0.2, 0.0), DVec3::new(0.0, 0.0, 5.0));
+    let state = State { linear: way, angular: spin, ..system.states()[body] };
     system.set_state(body, state).expect("finite");
     let mut engine = engine(system, collide(Mode::exact()));
     for _ in 0..100 {
         engine.step(1e-3).expect("a step");
     }
     let expected = spin / 1.002f64.powi(100);
-    let found = engine.system().states()[body].angular;
+    let State { linear, angular: found, .. } = engine.system().states()[body];
     assert!(found.distance(expected) < 1e-9, "{found} instead of {expected}");
+    let expected = way / 1.003f64.powi(100);
+    assert!(linear.distance(expected) < 1e-9, "{linear} instead of {expected}");
 }
 
 #[test]

@@ -109,7 +109,12 @@ impl Newton {
             {
                 free_of[k] = Some(free.len());
                 let (gravity, wrench) = (self.system.gravity, self.system.wrenches()[k]);
-                let outside = Outside { gravity, wrench, angular_damping: body.angular_damping };
+                let outside = Outside {
+                    gravity,
+                    wrench,
+                    linear_damping: body.linear_damping,
+                    angular_damping: body.angular_damping,
+                };
                 let rotation = Rotation::new(&mass, state, &outside, h);
                 let mean = rotation.mean(rotation.momentum);
                 // Rows act in the middle of the rotation.

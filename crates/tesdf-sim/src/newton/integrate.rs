@@ -27,13 +27,16 @@ pub struct Outside {
     pub gravity: DVec3,
     /// Force and torque.
     pub wrench: Wrench,
+    /// As [`Body::linear_damping`](crate::Body::linear_damping).
+    pub linear_damping: f64,
     /// As [`Body::angular_damping`](crate::Body::angular_damping).
     pub angular_damping: f64,
 }
 
 /// The velocity of the centre of mass after a step of `h` seconds without contacts.
 pub fn free_linear(mass: &MassProperties, state: &State, outside: &Outside, h: f64) -> DVec3 {
-    state.linear + h * (outside.gravity + outside.wrench.force / mass.mass)
+    state.linear / (1.0 + outside.linear_damping * h)
+        + h * (outside.gravity + outside.wrench.force / mass.mass)
 }
 
 /// The pose after moving for `h` seconds with a constant velocity of `center`, a point of the body
@@ -60,6 +63,9 @@ mod tests {
         let outside = Outside { gravity: DVec3::NEG_Z, wrench, ..Outside::default() };
         let linear = free_linear(&mass, &state, &outside, 0.01);
         assert!(linear.distance(DVec3::new(1.0, 0.02, -0.01)) < 1e-15, "{linear}");
+        let outside = Outside { linear_damping: 25.0, ..outside };
+        let linear = free_linear(&mass, &state, &outside, 0.01);
+        assert!(linear.distance(DVec3::new(0.8, 0.02, -0.01)) < 1e-15, "{linear}");
     }
 
     #[test]

@@ -65,6 +65,7 @@ impl LoadedScene {
             system
                 .set_friction(body, section.friction)
                 .and_then(|()| system.set_restitution(body, section.restitution))
+                .and_then(|()| system.set_linear_damping(body, section.linear_damping))
                 .and_then(|()| system.set_angular_damping(body, section.angular_damping))
                 .map_err(|e| self.body_error(k, e.to_string()))?;
         }

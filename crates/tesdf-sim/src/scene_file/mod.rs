@@ -250,6 +250,9 @@ pub struct BodySection {
     /// Coefficient of restitution. Between two bodies the geometric mean of theirs acts.
     #[serde(default)]
     pub restitution: f64,
+    /// Rate at which the velocity of a free body decays, 1/s.
+    #[serde(default)]
+    pub linear_damping: f64,
     /// Rate at which the angular velocity of a free body decays, 1/s.
     #[serde(default)]
     pub angular_damping: f64,

@@ -2,7 +2,8 @@
 //! `docs/dynamics.md` has a table of them.
 use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, Shape, Velocity, clearance};
 use tesdf::glam::{DQuat, DVec3};
-use tesdf_sim::State;
+use tesdf_sim::scene_file::LoadedScene;
+use tesdf_sim::{Dynamics, State};
 
 use crate::support::bench::{Bench, Body, Kind, STEP, ball};
 use crate::support::meshes::{bowl, tiles};
@@ -105,6 +106,27 @@ fn cards_that_lean_on_each_other_stand_above_half_the_tangent() {
             false => sunk.iter().all(|&way| way > FALLS),
         };
         assert!(is_right, "{kind:?}, μ {friction}: sinks by {sunk:?}");
+    }
+}
+
+/// A ball that falls through a medium approaches the speed at which it slows down by what it gains:
+/// v = v / (1 + c h) + g h, so v = g (1 + c h) / c.
+#[test]
+fn a_damped_body_falls_at_its_terminal_speed() {
+    const DAMPING: f64 = 40.0;
+    const RATE: f64 = 1e-3;
+    let scene = format!(
+        "time_step = {RATE:?}\nduration = 1\n[[bodies]]\nname = \"ball\"\nmass = 2\n\
+         shape = {{ sphere = {{ radius = 0.1 }} }}\nlinear_damping = {DAMPING:?}\n"
+    );
+    let loaded = LoadedScene::parse(scene, "scene.toml").unwrap();
+    let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
+    for step in 1..=1000 {
+        engine.step(RATE).unwrap();
+        let terminal = G * (1.0 + DAMPING * RATE) / DAMPING;
+        let expected = terminal * (1.0 - (1.0 + DAMPING * RATE).powi(-step));
+        let State { linear, .. } = engine.system().states()[0];
+        assert!(linear.distance(-expected * DVec3::Z) < 1e-12, "step {step}: {linear}, expected {expected}");
     }
 }
 
