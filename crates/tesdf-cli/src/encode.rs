@@ -9,7 +9,9 @@ use tesdf::asset::about::{Repair, Source, Statistics};
 use tesdf::base::unit;
 use tesdf::domain::tetrahedra_files;
 use tesdf::encode::{DomainChoice, EncodeOptions, Encoder, Method};
-use tesdf::mesh::{Defect, LoadReport, LoadedSolid, RepairReport, Severity, SolidMesh, SolidOptions};
+use tesdf::mesh::{
+    Defect, LoadReport, LoadedSolid, MeshFormat, RepairReport, Severity, SolidMesh, SolidOptions,
+};
 use tesdf::{Certificate, Progress, TeSdf};
 
 use crate::terminal::device::{self, Choice};
@@ -125,6 +127,13 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
+    if MeshFormat::of_path(&args.output).is_ok() {
+        let output = args.output.display();
+        return Err(Failure::new(format!(
+            "{output}: the extension is that of a mesh, but an asset would be written"
+        ))
+        .hint(format!("-o {}", args.output.with_extension("tesdf").display())));
+    }
     let output = output::open(&args.output, &args.inputs(), args.consent)?;
     let start = Instant::now();
     args.cad.check(&args.mesh)?;

@@ -266,15 +266,25 @@ fn files_that_cannot_be_read_or_written_are_named() {
     let folder = Folder::new();
     folder.write("cube.obj", format!("{VERTICES}{FACES}"));
     folder.write("bad.obj", "v 0 0 zero\n");
+    folder.write("bad.txt", "");
     folder.write("empty.stl", "");
     for (args, expected) in [
         (&["check", "none.stl"][..], "error: cannot read none.stl: "),
-        (&["check", "cube.dwg"], "error: cube.dwg: the extension names no mesh format that can be read"),
+        (&["check", "none"], "error: cannot read none: "),
+        (&["check", "bad.txt"], "error: bad.txt: the extension names no mesh format that can be read"),
         (&["check", "bad.obj"], "error: bad.obj: OBJ, line 1: 'zero' is not a number"),
         (&["check", "empty.stl"], "error: empty.stl: the file is empty"),
         (
             &["repair", "cube.obj", "-o", "r.step"],
             "error: r.step: the extension names no mesh format that can be written",
+        ),
+        (
+            &["repair", "cube.obj", "-o", "-"],
+            "error: -: expected the name of an output file\nhint: /dev/stdout ",
+        ),
+        (
+            &["encode", "cube.obj", "-o", "c.stl"],
+            "error: c.stl: the extension is that of a mesh, but an asset would be written\nhint: -o c.tesdf\n",
         ),
         (&["repair", "cube.obj", "-o", "no/r.ply"], "error: cannot write no/r.ply: "),
     ] {

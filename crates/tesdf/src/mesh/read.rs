@@ -238,7 +238,10 @@ pub fn read_with(path: impl AsRef<Path>, cad: &CadOptions) -> Result<LoadedMesh,
 }
 
 fn read_path(path: &Path, cad: &CadOptions) -> Result<LoadedMesh, ReadError> {
-    let format = MeshFormat::of_path(path)?;
+    let format = MeshFormat::of_path(path).map_err(|unknown| match std::fs::metadata(path) {
+        Ok(_) => unknown,
+        Err(source) => ReadError::Open { path: path.to_owned(), source },
+    })?;
     let bytes = input::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(&bytes, format, From { folder: Some(folder), cad: Some(cad) })

@@ -162,7 +162,7 @@ fn extensions_decide_and_unknown_ones_list_the_known() {
     assert_eq!(MeshFormat::of_path(Path::new("a/B.STL")).unwrap(), MeshFormat::Stl);
     assert_eq!(MeshFormat::of_path(Path::new("b.Glb")).unwrap(), MeshFormat::Glb);
     for name in ["part.sldprt", "part", ".obj"] {
-        let error = read(Path::new(name)).unwrap_err();
+        let error = MeshFormat::of_path(Path::new(name)).unwrap_err();
         assert!(matches!(error, ReadError::UnknownExtension { .. }));
         assert!(error.to_string().contains(".stl, .obj, .ply, .off, .gltf, .glb"), "{error}");
     }
@@ -256,7 +256,17 @@ fn ascii_stl_variants() {
     let loaded = read_bytes(two, MeshFormat::Stl).unwrap();
     assert_eq!(loaded.mesh.faces(), [[0, 1, 2], [0, 2, 3]]);
     assert_eq!(loaded.report.welded_vertices, 2);
+    // Words that are written apart, and a last solid without an end.
+    let facet =
+        "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nEnd loop\nend facet\n";
+    let split = read_bytes(format!("solid a\n{facet}end solid a\n").as_bytes(), MeshFormat::Stl).unwrap();
+    assert_eq!((split.mesh.faces().len(), split.report.notes.len()), (1, 0));
+    let open = read_bytes(format!("solid a\n{facet}{facet}").as_bytes(), MeshFormat::Stl).unwrap();
+    let note = "line 15: the file ends after facet 1 (0-based) without 'endsolid': is it cut short?";
+    assert!(open.report.notes.contains(&note.to_string()), "{:?}", open.report.notes);
     let cases: &[(&[u8], &[&str])] = &[
+        (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nend it", &["line 7", "'it'"]),
+        (b"solid a\nend it", &["line 2", "'end'", "expected 'facet'"]),
         (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0\n", &["line 5", "facet 0", "cut short"]),
         (b"solid a\n", &["line 1", "'facet' or 'endsolid'"]),
         (b"solid a\nendsolid a\n", &["no face"]),

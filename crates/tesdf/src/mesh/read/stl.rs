@@ -80,10 +80,17 @@ fn parse_ascii(bytes: &[u8]) -> Result<RawMesh, ReadError> {
         loop {
             let faces = raw.ends.len();
             let Some((line, word)) = words.next() else {
-                return Err(ended(last_line, "'facet' or 'endsolid'", faces));
+                // Other readers take such a file, and all of its facets are whole.
+                raw.notes.push(format!(
+                    "line {last_line}: the file ends after facet {} (0-based) without 'endsolid': is it cut short?",
+                    faces.checked_sub(1).ok_or_else(|| ended(last_line, "'facet' or 'endsolid'", 0))?
+                ));
+                return Ok(raw);
             };
             last_line = line;
-            if word.eq_ignore_ascii_case(b"endsolid") {
+            let is_split = word.eq_ignore_ascii_case(b"end")
+                && words.next_if(|(_, word)| word.eq_ignore_ascii_case(b"solid")).is_some();
+            if is_split || word.eq_ignore_ascii_case(b"endsolid") {
                 solid_name(&mut words, line, b"solid");
                 break;
             }
@@ -113,8 +120,15 @@ fn parse_ascii(bytes: &[u8]) -> Result<RawMesh, ReadError> {
                 raw.corners.push(raw.positions.len() as u64);
                 raw.push_vertex(p, at);
             }
-            keyword(next("'endloop'")?, "endloop", faces)?;
-            keyword(next("'endfacet'")?, "endfacet", faces)?;
+            for what in ["loop", "facet"] {
+                let (whole, (line, word)) = (format!("end{what}"), next("'endloop' and 'endfacet'")?);
+                // Some programs write two words.
+                if word.eq_ignore_ascii_case(b"end") {
+                    keyword(next(what)?, what, faces)?;
+                } else {
+                    keyword((line, word), &whole, faces)?;
+                }
+            }
             raw.end_face(line);
         }
     }
