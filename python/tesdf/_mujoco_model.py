@@ -36,6 +36,17 @@ class Geoms:
         self.ids: Integer = np.array(numbers)
         self.shapes = [_placed(model, number, name, geoms[name]) for number, name in zip(numbers, geoms)]
         self.excluded = list(_excluded(model, numbers))
+        apart = {place: {place} for place in range(len(numbers))}
+        for a, b in self.excluded:
+            apart[a].add(b)
+            apart[b].add(a)
+        for place, (name, asset) in enumerate(geoms.items()):
+            if asset is not None and len(apart[place]) == len(numbers):
+                raise ValueError(
+                    f"geom {name!r} meets no other of geoms, and its contacts with all others are switched off: name the"
+                    " geoms that it may touch, such as {'floor': None}, which takes the shape of a plane, box, sphere or"
+                    " capsule from the model"
+                )
         self.moves = model.body_weldid[model.geom_bodyid[self.ids]] != 0
         """[N] whether a geom can move"""
         for number, asset in zip(numbers, geoms.values()):

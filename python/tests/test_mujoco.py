@@ -232,7 +232,8 @@ def test_bodies_that_do_not_meet(cube):
         ({"geoms": {"floor": "cube"}}, "geom 'floor' is a plane; an asset needs a mesh geom"),
         ({"geoms": {"cube": "torus"}}, "geom 'cube': its mesh spans"),
         ({"geoms": {"cube": "cube", "wall": None}, "solref": "soft"}, "solref: 'soft'; expected 'rigid', 'model'"),
-        ({"geoms": {"cube": "cube"}, "solref": (1.0, 2.0, 3.0)}, "expected 'rigid', 'model' or two numbers"),
+        ({"geoms": {"cube": "cube"}}, "geom 'cube' meets no other of geoms"),
+        ({"geoms": {"cube": "cube", "wall": None}, "solref": (1.0, 2.0, 3.0)}, "expected 'rigid', 'model' or two numbers"),
     ],
 )
 def test_what_does_not_fit_is_an_error(change, expected, cube, asset):
@@ -252,11 +253,11 @@ def test_other_errors(cube, screw):
         contacts.step(model, data)
     model, data = model_of(CUBE.replace('scale="5 5 5"', 'scale="5 5 4"'))
     with pytest.raises(ValueError, match="scale"):
-        tesdf.mujoco.Contacts(model, {"cube": cube})
+        tesdf.mujoco.Contacts(model, {"cube": cube, "floor": None})
     model, data = model_of(CUBE)
     mujoco.mj_forward(model, data)
     with pytest.raises(ValueError, match="mode: 'corner'"):
-        tesdf.mujoco.Contacts(model, {"cube": cube}, mode="corner").detect(model, data)
+        tesdf.mujoco.Contacts(model, {"cube": cube, "floor": None}, mode="corner").detect(model, data)
     model, data = model_of(SCREW.replace('"100M"', '"1M"'))
     contacts = tesdf.mujoco.Contacts(model, screw)
     mujoco.mj_step1(model, data)
