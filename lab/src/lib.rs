@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use tesdf::base::Isa;
+use tesdf_cli::terminal::interrupt;
 use tesdf_cli::terminal::report::{self, Outcome};
 
 pub mod benchmarks;
@@ -64,6 +65,10 @@ pub fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
         }
     };
+    if let Err(failure) = interrupt::install() {
+        report::error(&failure);
+        return ExitCode::from(2);
+    }
     if let Some(isa) = cli.isa {
         isa.limit_to();
     }

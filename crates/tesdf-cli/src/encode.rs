@@ -15,10 +15,11 @@ use tesdf::mesh::{
 use tesdf::{Certificate, Progress, TeSdf};
 
 use crate::terminal::device::{self, Choice};
+use crate::terminal::interrupt;
 use crate::terminal::mesh_file::CadArgs;
 use crate::terminal::output;
 use crate::terminal::output::Consent;
-use crate::terminal::progress::{interrupt_flag, watched};
+use crate::terminal::progress::watched;
 use crate::terminal::report::{self, Failure, Outcome};
 
 pub(crate) mod choices;
@@ -153,13 +154,13 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     warn(solid.warnings());
 
-    let interrupted = interrupt_flag()?;
+    let interrupted = interrupt::flag();
     let progress = Progress::default();
     if options.method == Method::Certified && args.device != Choice::Processor {
         return Err(Failure::new("--device only applies to the sampled encoder; add --encoder sampled"));
     }
     let sampler = args.device.sampler()?;
-    let encoded = watched(&progress, &interrupted, || {
+    let encoded = watched(&progress, interrupted, || {
         pool.install(|| {
             let encoder =
                 Encoder::new().options(options).source(source).sampler(&*sampler).progress(&progress);

@@ -2,9 +2,9 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use crate::terminal::interrupt;
 use crate::terminal::output::{self, Consent};
 use crate::terminal::parse;
-use crate::terminal::progress::interrupt_flag;
 use crate::terminal::report::{self, Failure, Outcome};
 use tesdf_playback::{Frames, GlbOptions, Playback, glb};
 
@@ -60,9 +60,9 @@ impl FrameArgs {
 /// # Errors
 /// The run or a geometry cannot be opened, a state is not valid, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let interrupted = interrupt_flag()?;
+    let interrupted = interrupt::flag();
     let OpenRun { record, system, output, .. } =
-        open_run::open(&args.run, &args.geometries, &args.output, args.consent, &interrupted)?;
+        open_run::open(&args.run, &args.geometries, &args.output, args.consent, interrupted)?;
     let at = |e| Failure::new(format!("{}: {e}", args.run.display()));
     let run = Playback::new(&record, &system, args.frames.frames()).map_err(at)?;
     let bytes = glb(&run, &GlbOptions { speed: args.speed }).map_err(at)?;

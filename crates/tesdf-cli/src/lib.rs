@@ -35,6 +35,7 @@ pub mod verify;
 pub mod view;
 pub mod why;
 
+use crate::terminal::interrupt;
 use crate::terminal::report::{self, Failure, Outcome};
 
 /// Exact signed distances of triangle meshes.
@@ -102,6 +103,10 @@ pub fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
         }
     };
+    if let Err(failure) = interrupt::install() {
+        report::error(&failure);
+        return ExitCode::from(2);
+    }
     // A panic is a bug in tesdf; the shell still gets a documented exit code.
     let outcome = catch_unwind(AssertUnwindSafe(|| run(&cli.command))).unwrap_or_else(|_| {
         Err(Failure::new("tesdf has a bug: the message above says where")

@@ -15,8 +15,9 @@ use tesdf_sim::{Dynamics, InterruptedRun, Moment, PartialRun, RunOrigin, Summary
 
 use crate::collide::warn_of_coarse;
 use crate::terminal::device::{self, Choice, Device};
+use crate::terminal::interrupt;
 use crate::terminal::output::{self, Consent};
-use crate::terminal::progress::{interrupt_flag, watched};
+use crate::terminal::progress::watched;
 use crate::terminal::report::{self, Failure, Outcome};
 use crate::terminal::{parse, run_file};
 
@@ -142,10 +143,10 @@ pub fn run_with(
     inputs.extend(args.scene.clone());
     let output = output::open(args.output(), &inputs, args.consent)?;
     let device = args.device.open()?;
-    let interrupted = interrupt_flag()?;
+    let interrupted = interrupt::flag();
     let progress = Progress::default();
     loaded.assets = if args.no_cache { None } else { AssetCache::of_user() };
-    let system = watched(&progress, &interrupted, || loaded.system_watched(&progress));
+    let system = watched(&progress, interrupted, || loaded.system_watched(&progress));
     let mut system = system.map_err(|e| match e {
         SceneError::Cancelled => {
             Failure::new(format!("interrupted; {} is unchanged", args.output().display()))
@@ -171,7 +172,7 @@ pub fn run_with(
     };
     let mut engine = engine.map_err(Failure::new)?;
     let mut live = args.view.then(|| follow(args, engine.system())).transpose()?;
-    let bar = LiveProgress::new(&interrupted);
+    let bar = LiveProgress::new(interrupted);
     let mut recorder = Recorder::new(&output, &origin, earlier.as_ref());
     let ended = simulate_from(&loaded.scene, &mut engine, begun, |moment| {
         recorder.push(moment)?;

@@ -12,7 +12,8 @@ use tesdf::asset::AssetError;
 use tesdf::verify::{PrecisionReport, ProveReport, VerifyError, VerifyOptions, VerifyReport, Worst, verify};
 
 use crate::terminal::asset_file;
-use crate::terminal::progress::{Bar, interrupt_flag};
+use crate::terminal::interrupt;
+use crate::terminal::progress::Bar;
 use crate::terminal::report::{self, Failure, Outcome, count};
 
 /// Arguments of `tesdf verify`.
@@ -90,15 +91,15 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             );
         }
     };
-    let interrupted = interrupt_flag()?;
-    let (comparison, mut error) = match compare(args, &asset, &interrupted)? {
+    let interrupted = interrupt::flag();
+    let (comparison, mut error) = match compare(args, &asset, interrupted)? {
         Ok(found) => (Some(found), None),
         Err(e) => (None, Some(e.to_string())),
     };
     let mut passed = comparison.as_ref().is_some_and(|c| c.passed);
     let mut prove = None;
     if args.prove {
-        match proof::run(args, &asset, &interrupted)? {
+        match proof::run(args, &asset, interrupted)? {
             Ok(found) => {
                 passed &= found.proved;
                 prove = Some(found);

@@ -2,8 +2,9 @@
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
+use crate::terminal::interrupt;
 use crate::terminal::output::{self, Consent};
-use crate::terminal::progress::{Bar, interrupt_flag};
+use crate::terminal::progress::Bar;
 use crate::terminal::report::{self, Failure, Outcome};
 use tesdf::collide::CollideError;
 use tesdf_playback::{Arrows, ContactOptions, FrameContacts, Playback, PlaybackError, page};
@@ -45,8 +46,8 @@ pub struct Args {
 /// The run or a geometry cannot be opened, a state is not valid, Ctrl-C was pressed, or the file
 /// cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let interrupted = interrupt_flag()?;
-    let opened = open_run::open(&args.run, &args.geometries, &args.output, args.consent, &interrupted)?;
+    let interrupted = interrupt::flag();
+    let opened = open_run::open(&args.run, &args.geometries, &args.output, args.consent, interrupted)?;
     let OpenRun { record, system, output, .. } = &opened;
     let at = |e: PlaybackError| match e {
         PlaybackError::Collide(CollideError::Stopped) => {
@@ -55,7 +56,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         e => Failure::new(format!("{}: {e}", args.run.display())),
     };
     let run = Playback::new(record, system, args.frames.frames()).map_err(at)?;
-    let contacts = contacts(args, &opened, &run, &interrupted).map_err(at)?;
+    let contacts = contacts(args, &opened, &run, interrupted).map_err(at)?;
     let forces = if args.contacts > 0 { run.forces(args.contacts) } else { None };
     let name = || args.run.file_stem().map(|name| name.to_string_lossy().into_owned());
     let title = args.title.clone().or_else(name).unwrap_or_default();

@@ -8,7 +8,7 @@ use serde::Serialize;
 use tesdf::collide::{ClearanceOptions, CollideError, Instance, Pose, Scene, clearance};
 use tesdf::glam::DVec3;
 use tesdf::{EncodeOptions, TeSdf};
-use tesdf_cli::terminal::progress::interrupt_flag;
+use tesdf_cli::terminal::interrupt;
 use tesdf_cli::terminal::report::{self, Failure};
 
 use super::frames::geometry;
@@ -53,9 +53,9 @@ type Body = (Arc<TeSdf>, String);
 /// # Errors
 /// A file cannot be read, or its mesh cannot be encoded.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let interrupted = interrupt_flag()?;
+    let interrupted = interrupt::flag();
     let open = |path: &PathBuf| -> Result<Body, Failure> {
-        Ok((geometry(path, &EncodeOptions::default(), &interrupted)?, name(path)))
+        Ok((geometry(path, &EncodeOptions::default(), interrupted)?, name(path)))
     };
     let bodies = args.bodies.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let mut random = fastrand::Rng::with_seed(args.seed);

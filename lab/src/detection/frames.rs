@@ -16,7 +16,8 @@ use tesdf_sim::scene_file::{LoadedScene, MAX_BODIES};
 
 use super::poses::{PoseFile, VERSION};
 use crate::scenes::criteria;
-use tesdf_cli::terminal::progress::{interrupt_flag, watched};
+use tesdf_cli::terminal::interrupt;
+use tesdf_cli::terminal::progress::watched;
 use tesdf_cli::terminal::report::Failure;
 use tesdf_cli::terminal::{asset_file, run_file};
 
@@ -63,10 +64,10 @@ impl Frames {
     /// # Errors
     /// A mesh cannot be read or encoded.
     pub fn of_scene(loaded: &LoadedScene) -> Result<Self, Failure> {
-        let interrupted = interrupt_flag()?;
+        let interrupted = interrupt::flag();
         let progress = Progress::default();
         let system =
-            watched(&progress, &interrupted, || loaded.system_watched(&progress)).map_err(Failure::new)?;
+            watched(&progress, interrupted, || loaded.system_watched(&progress)).map_err(Failure::new)?;
         let scene = system.scene().clone();
         let poses = vec![scene.instances().map(|(_, instance)| instance.pose).collect()];
         Ok(Self { scene, poses, contact_distance: loaded.scene.detector.contact_distance })
@@ -110,13 +111,13 @@ impl Frames {
         }
         let mut scene = Scene::new();
         let (mut shapes, mut opened) = (Vec::new(), BTreeMap::new());
-        let interrupted = interrupt_flag()?;
+        let interrupted = interrupt::flag();
         for body in &file.bodies {
             let path = folder.join(body);
             let file = path.canonicalize().unwrap_or_else(|_| path.clone());
             let shape = match opened.get(&file) {
                 Some(&shape) => shape,
-                None => scene.add_shape(geometry(&path, options, &interrupted)?).map_err(Failure::new)?,
+                None => scene.add_shape(geometry(&path, options, interrupted)?).map_err(Failure::new)?,
             };
             opened.insert(file, shape);
             shapes.push(shape);
@@ -199,7 +200,7 @@ pub fn encode_meshes(loaded: &mut LoadedScene, options: &EncodeOptions) -> Resul
         Failure::new(format!("no temporary folder: {e}"))
             .hint("set TMPDIR to a folder that can be written to")
     })?;
-    let interrupted = interrupt_flag()?;
+    let interrupted = interrupt::flag();
     let scene_folder = loaded.path.parent().unwrap_or(Path::new("")).to_path_buf();
     let mut encoded: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
     for body in &mut loaded.scene.bodies {
@@ -210,7 +211,7 @@ pub fn encode_meshes(loaded: &mut LoadedScene, options: &EncodeOptions) -> Resul
             Entry::Occupied(asset) => asset.into_mut(),
             Entry::Vacant(entry) => {
                 let asset = folder.path().join(format!("{number}.tesdf"));
-                geometry(entry.key(), options, &interrupted)?.save(&asset).map_err(Failure::new)?;
+                geometry(entry.key(), options, interrupted)?.save(&asset).map_err(Failure::new)?;
                 entry.insert(asset)
             }
         };

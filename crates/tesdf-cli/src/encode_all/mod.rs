@@ -23,9 +23,10 @@ use tesdf::Progress;
 use tesdf::encode::DomainChoice;
 
 use crate::encode::choices::ChoiceArgs;
+use crate::terminal::interrupt;
 use crate::terminal::mesh_file::CadArgs;
 use crate::terminal::output::{self, Consent};
-use crate::terminal::progress::{Bar, interrupt_flag};
+use crate::terminal::progress::Bar;
 use crate::terminal::report::{self, Failure, Outcome};
 use job::{Done, Job, State};
 use manifest::{Manifest, Times};
@@ -177,7 +178,7 @@ fn pools(threads: usize, jobs: usize) -> Result<Vec<ThreadPool>, Failure> {
 /// # Errors
 /// Ctrl-C was pressed.
 fn all(job: &Job, meshes: &[Mesh], pools: &[ThreadPool]) -> Result<Vec<Done>, Failure> {
-    let interrupted = interrupt_flag()?;
+    let interrupted = interrupt::flag();
     // The large ones first: the last mesh to end is then a small one, and few threads are idle.
     let mut order: Vec<_> = (0..meshes.len()).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(meshes[i].bytes));

@@ -1,7 +1,7 @@
 //! The bodies of a recorded run at one of its steps.
 use std::path::Path;
 
-use crate::terminal::progress::interrupt_flag;
+use crate::terminal::interrupt;
 use crate::terminal::report::Failure;
 use tesdf::collide::Placement;
 use tesdf::glam::Vec3;
@@ -19,9 +19,9 @@ use crate::open_run::{self, OpenRun};
 /// drawn.
 pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     let at = |reason: &dyn std::fmt::Display| Failure::new(format!("{}: {reason}", run.display()));
-    let interrupted = interrupt_flag()?;
+    let interrupted = interrupt::flag();
     let OpenRun { record, system, output, .. } =
-        open_run::open(run, &args.geometries, &args.output, args.consent, &interrupted)?;
+        open_run::open(run, &args.geometries, &args.output, args.consent, interrupted)?;
 
     let end = record.times().last().copied();
     let time = args.time.or(end).ok_or_else(|| at(&"it has no steps"))?;

@@ -1,13 +1,10 @@
-//! Progress bars on stderr, and Ctrl-C.
+//! Progress bars on stderr.
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tesdf::{Progress, Stage};
-
-use crate::terminal::report::Failure;
 
 /// A progress bar on stderr with the estimated remaining time. Nothing is drawn unless stderr is a
 /// terminal.
@@ -49,30 +46,6 @@ impl Drop for Bar {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
-}
-
-/// Returns a flag that the first Ctrl-C sets, the same flag each time. The second Ctrl-C ends the
-/// process at once.
-///
-/// # Errors
-/// The system refuses the handler, or another handler is already installed.
-pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
-    static FLAG: Mutex<Option<Arc<AtomicBool>>> = Mutex::new(None);
-    let mut installed = FLAG.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(flag) = &*installed {
-        return Ok(Arc::clone(flag));
-    }
-    let flag = Arc::new(AtomicBool::new(false));
-    let seen = Arc::clone(&flag);
-    ctrlc::set_handler(move || {
-        if seen.swap(true, Ordering::Relaxed) {
-            // Files are written under a temporary name and then renamed, so no incomplete file has
-            // its final name. The journal of a run is readable up to its last complete step.
-            std::process::exit(2);
-        }
-    })
-    .map_err(|e| Failure::new(format!("cannot handle Ctrl-C: {e}")))?;
-    Ok(Arc::clone(installed.insert(flag)))
 }
 
 /// Runs `work` while another thread draws its progress and passes Ctrl-C on to it.

@@ -142,7 +142,7 @@ fn ctrl_c_leaves_no_half_file() {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let (code, out, err) = crate::folder::texts(child.wait_with_output().unwrap());
     assert_eq!((code, out.as_str()), (Some(2), ""));
-    assert_eq!(err, "error: interrupted; f.tesdf is unchanged\n");
+    assert!(err.starts_with("error: interrupted; "), "{err}");
     assert_eq!(folder.names(), ["f.tesdf", "torus.obj"]);
     assert_eq!(std::fs::read(folder.path("f.tesdf")).unwrap(), b"what was here before");
 }

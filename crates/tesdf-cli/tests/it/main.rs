@@ -11,6 +11,8 @@ mod encode_all;
 mod encode_query_verify;
 mod folder;
 mod inside;
+#[cfg(target_os = "linux")]
+mod interrupts;
 #[cfg(unix)]
 mod kills;
 #[cfg(target_os = "linux")]
