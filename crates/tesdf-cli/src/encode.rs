@@ -13,6 +13,7 @@ use tesdf::mesh::{
     Defect, LoadReport, LoadedSolid, MeshFormat, RepairReport, Severity, SolidMesh, SolidOptions,
 };
 use tesdf::{Certificate, Progress, TeSdf};
+use tesdf_sim::robot::RobotFormat;
 
 use crate::terminal::device::{self, Choice};
 use crate::terminal::interrupt;
@@ -111,8 +112,8 @@ struct Report<'a> {
 /// The mesh cannot be read or has no well-defined inside, an option does not apply to it, the file
 /// cannot be written, or Ctrl-C was pressed. The output file is then unchanged.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    if let Some(kind) = robot::kind(&args.mesh)? {
-        return robot::run(args, kind);
+    if let Some(format) = RobotFormat::of_path(&args.mesh).map_err(Failure::new)? {
+        return robot::run(args, format);
     }
     if !args.packages.is_empty() {
         return Err(Failure::new(format!(

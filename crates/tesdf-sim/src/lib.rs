@@ -15,6 +15,7 @@
 //! - [`Joint`], [`Motor`]: what connects bodies besides contacts.
 //! - [`script`]: keyframes of kinematic bodies, motors and wrenches.
 //! - [`scene_file`]: scenes as TOML files.
+//! - [`robot`]: robot descriptions in URDF and MJCF.
 //! - [`criterion`]: what makes a run a success; other crates can add criteria.
 //! - [`Run`]: a run that is made step by step.
 //! - [`record`]: run files.
@@ -31,6 +32,7 @@ mod joint;
 mod mass;
 pub mod newton;
 pub mod record;
+pub mod robot;
 pub mod scene_file;
 pub mod script;
 mod simulate;

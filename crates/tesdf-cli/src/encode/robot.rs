@@ -1,12 +1,5 @@
 //! `tesdf encode ROBOT -o FOLDER`: encodes the collision meshes of a robot description.
-//!
-//! `mjcf-rs`, of the makers of Rapier, reads MJCF: it resolves includes, classes of defaults and
-//! folders. URDF is read here with `roxmltree`: `urdf-rs` 0.10.0 names no line in its errors,
-//! refuses a file because of parts that have no mesh, and depends on two XML parsers that nobody
-//! maintains.
-mod include;
 mod mjcf;
-mod packages;
 mod urdf;
 
 use std::collections::HashMap;
@@ -16,17 +9,11 @@ use std::path::{Path, PathBuf};
 use crate::terminal::report::{Failure, Outcome};
 use tesdf::glam::{DAffine3, DVec3};
 use tesdf::mesh::MeshFormat;
+use tesdf_sim::robot::RobotFormat;
 
 use super::Args;
 use crate::encode_all::file_names;
 use crate::encode_all::meshes::{Content, Details, Mesh, Placed, Use};
-
-/// Formats of robot descriptions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    Urdf,
-    Mjcf,
-}
 
 /// The use of a mesh in a robot description.
 struct MeshUse {
@@ -40,30 +27,6 @@ struct MeshUse {
     used_by: Use,
 }
 
-/// The kind of a robot description, by its extension and its first element. `None` for other files.
-pub(super) fn kind(path: &Path) -> Result<Option<Kind>, Failure> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match extension.as_str() {
-        "urdf" => Ok(Some(Kind::Urdf)),
-        "mjcf" => Ok(Some(Kind::Mjcf)),
-        "xacro" => Err(Failure::new(format!("{}: xacro files are programs that print URDF", path.display()))
-            .hint("`xacro FILE > robot.urdf` makes the file that can be encoded")),
-        "xml" => {
-            let text = read(path)?;
-            let document = parse(path, &text)?;
-            match document.root_element().tag_name().name() {
-                "mujoco" | "mujocoinclude" => Ok(Some(Kind::Mjcf)),
-                "robot" => Ok(Some(Kind::Urdf)),
-                other => Err(Failure::new(format!(
-                    "{}: the first element is <{other}>; expected <mujoco> of MJCF or <robot> of URDF",
-                    path.display()
-                ))),
-            }
-        }
-        _ => Ok(None),
-    }
-}
-
 /// Parses `--package NAME=PATH`.
 pub(super) fn package(text: &str) -> Result<(String, PathBuf), String> {
     match text.split_once('=') {
@@ -72,43 +35,32 @@ pub(super) fn package(text: &str) -> Result<(String, PathBuf), String> {
     }
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
-    tesdf::input::read_to_string(path)
-        .map_err(|e| Failure::new(format!("cannot read {}: {e}", path.display())))
-}
-
-fn parse<'a>(path: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, Failure> {
-    let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
-    roxmltree::Document::parse_with_options(text, options)
-        .map_err(|e| Failure::new(format!("{}: the XML is broken: {e}", path.display())))
-}
-
 /// Encodes each mesh once for each scale. A mesh that cannot be encoded stops nothing: the manifest
 /// says why.
-pub(super) fn run(args: &Args, kind: Kind) -> Result<Outcome, Failure> {
+pub(super) fn run(args: &Args, format: RobotFormat) -> Result<Outcome, Failure> {
     if args.split {
         return Err(Failure::new(
             "--split is for one mesh file; a robot description has an asset for each mesh",
         ));
     }
-    let uses = match kind {
-        Kind::Urdf => urdf::uses(&args.mesh, &args.packages)?,
-        Kind::Mjcf if !args.packages.is_empty() => {
+    let uses = match format {
+        RobotFormat::Urdf => urdf::uses(&args.mesh, &args.packages)?,
+        RobotFormat::Mjcf if !args.packages.is_empty() => {
             return Err(Failure::new(
                 "--package is of URDF files; MJCF names files without packages; leave it out",
             ));
         }
-        Kind::Mjcf => mjcf::uses(&args.mesh)?,
+        RobotFormat::Mjcf => mjcf::uses(&args.mesh)?,
     };
     if uses.is_empty() {
         let found = format!("{} names no collision mesh; expected at least one", args.mesh.display());
         return Err(Failure::new(found));
     }
-    args.batch(meshes(uses, kind))?.run(args.consent)
+    args.batch(meshes(uses, format))?.run(args.consent)
 }
 
 /// The meshes, each once, in the order of their first uses.
-fn meshes(uses: Vec<MeshUse>, kind: Kind) -> Vec<Mesh> {
+fn meshes(uses: Vec<MeshUse>, format: RobotFormat) -> Vec<Mesh> {
     let mut known: HashMap<(PathBuf, [u64; 12]), usize> = HashMap::new();
     let mut meshes: Vec<Mesh> = Vec::new();
     let mut stems = Vec::new();
@@ -133,7 +85,7 @@ fn meshes(uses: Vec<MeshUse>, kind: Kind) -> Vec<Mesh> {
             pose: found.pose,
             label: label(&found.pose, found.scale),
             // URDF is in metres.
-            unit: (kind == Kind::Urdf).then(|| "m".to_owned()),
+            unit: (format == RobotFormat::Urdf).then(|| "m".to_owned()),
         };
         meshes.push(Mesh {
             name: found.reference,

@@ -136,7 +136,7 @@ fn an_mjcf_file_gives_the_meshes_of_geoms_that_can_touch() {
     );
     folder.write("model/loop.xml", "<mujoco><include file='loop.xml'/></mujoco>");
     let (code, _, err) = folder.tesdf(&["encode", "model/loop.xml", "-o", "assets"]);
-    assert!(code == Some(2) && err.contains("line 1: loop.xml includes itself"), "{err}");
+    assert!(code == Some(2) && err.contains("line 1: model/loop.xml includes itself"), "{err}");
     let (code, _, err) = folder.tesdf(&["encode", "model/robot.xml", "-o", "assets"]);
     assert!(code == Some(1) && err.contains("odd.msh"), "{err}");
     let manifest = manifest(&folder, "assets/manifest.json");

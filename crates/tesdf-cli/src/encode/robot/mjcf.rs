@@ -5,8 +5,9 @@ use crate::terminal::report::Failure;
 use mjcf_rs::Model;
 use mjcf_rs::body::{Geom, GeomType};
 use tesdf::glam::{DAffine3, DQuat, DVec3};
+use tesdf_sim::robot::expand;
 
-use super::{MeshUse, include};
+use super::MeshUse;
 use crate::encode_all::meshes::Use;
 
 /// All uses of meshes by geoms that can touch others, in the order of the bodies.
@@ -16,7 +17,7 @@ use crate::encode_all::meshes::Use;
 pub(super) fn uses(path: &Path) -> Result<Vec<MeshUse>, Failure> {
     let at = |found: &dyn std::fmt::Display| Failure::new(format!("{}: {found}", path.display()));
     let folder = path.parent().unwrap_or(Path::new(""));
-    let model = Model::from_str(&include::expand(path)?, folder).map_err(|e| at(&e))?;
+    let model = Model::from_str(&expand(path).map_err(Failure::new)?, folder).map_err(|e| at(&e))?;
     let mut found = Vec::new();
     for (b, body) in model.bodies.iter().enumerate() {
         let body = &body.body;

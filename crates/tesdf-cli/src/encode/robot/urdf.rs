@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 
 use crate::terminal::report::Failure;
 use tesdf::glam::{DAffine3, DVec3};
+use tesdf_sim::robot::{Packages, parse, read};
 
-use super::packages::Packages;
-use super::{MeshUse, parse, read};
+use super::MeshUse;
 use crate::encode_all::meshes::Use;
 
 /// All uses of meshes by `<collision>` elements, in the order of the file.
@@ -13,8 +13,8 @@ use crate::encode_all::meshes::Use;
 /// # Errors
 /// The file cannot be read or is no URDF, or a mesh has no file name or no valid scale.
 pub(super) fn uses(path: &Path, named: &[(String, PathBuf)]) -> Result<Vec<MeshUse>, Failure> {
-    let text = read(path)?;
-    let document = parse(path, &text)?;
+    let text = read(path).map_err(Failure::new)?;
+    let document = parse(path, &text).map_err(Failure::new)?;
     let robot = document.root_element();
     let at = |node: roxmltree::Node<'_, '_>| {
         format!("{}, line {}", path.display(), document.text_pos_at(node.range().start).row)

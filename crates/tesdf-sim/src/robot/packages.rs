@@ -3,8 +3,8 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where packages may be.
-pub(super) struct Packages<'a> {
+/// Where the packages of a URDF file may be.
+pub struct Packages<'a> {
     named: &'a [(String, PathBuf)],
     /// Folders that contain packages, or are one.
     roots: Vec<PathBuf>,
