@@ -1,7 +1,7 @@
 //! Joints between two bodies, or a body and the world, and the motors that drive them.
 use std::f64::consts::{PI, TAU};
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use tesdf::collide::Pose;
 
@@ -34,7 +34,7 @@ pub struct Joint {
     /// The joint's frame in the parent's frame (in the world without a parent), and in the child's
     /// frame.
     pub frames: [Pose; 2],
-    /// Bounds of the coordinate of a hinge, rad within ±π, or of a slider, m. For a ball: the
+    /// Bounds of the coordinate of a hinge, rad, or of a slider, m. For a ball: the
     /// greatest angle between the z axes of the two frames, rad, as the second number; the first
     /// one is 0.
     pub limits: Option<[f64; 2]>,
@@ -118,6 +118,30 @@ impl Joint {
         }
     }
 
+    /// Makes this the coordinate at the poses at which the frames agree.
+    ///
+    /// # Errors
+    /// The joint has no coordinate, or the number is out of range.
+    pub(crate) fn begin_at(&mut self, coordinate: f64) -> Result<(), String> {
+        let [_, child] = &mut self.frames;
+        match self.kind {
+            _ if coordinate == 0.0 => {}
+            JointKind::Hinge if coordinate.abs() <= PI => {
+                child.rotation = (child.rotation * DQuat::from_rotation_z(coordinate)).normalize();
+            }
+            JointKind::Slider if coordinate.is_finite() => {
+                child.translation += child.rotation * DVec3::Z * coordinate;
+            }
+            JointKind::Hinge | JointKind::Slider => {
+                return Err(format!("coordinate {coordinate}; expected a travel, or an angle within ±π"));
+            }
+            JointKind::Weld | JointKind::Ball => {
+                return Err("only hinges and sliders have a coordinate; take it out".into());
+            }
+        }
+        Ok(())
+    }
+
     /// The joint's frames in the world, when the parent and the child are at `poses`.
     pub fn frames_in_world(&self, poses: [Pose; 2]) -> [Pose; 2] {
         [0, 1].map(|k| {
@@ -168,16 +192,16 @@ impl Joint {
         if let Some([low, high]) = self.limits {
             let range = match self.kind {
                 JointKind::Weld => return Err("a weld has no limits; take them out".into()),
-                JointKind::Hinge if low >= -PI && high <= PI => low <= high,
-                JointKind::Slider if low.is_finite() && high.is_finite() => low <= high,
+                JointKind::Hinge | JointKind::Slider if low.is_finite() && high.is_finite() => low <= high,
                 JointKind::Ball if high <= PI => low == 0.0 && high > 0.0,
                 _ => false,
             };
             if !range {
                 let expected = match self.kind {
                     JointKind::Ball => "0 and an angle of at most π",
-                    JointKind::Hinge => "two angles within ±π, the lower one first",
-                    JointKind::Slider | JointKind::Weld => "two finite numbers, the lower one first",
+                    JointKind::Hinge | JointKind::Slider | JointKind::Weld => {
+                        "two finite numbers, the lower one first"
+                    }
                 };
                 return Err(format!("limits {low} to {high}; expected {expected}"));
             }
@@ -252,6 +276,11 @@ pub fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
+/// The angle, with all turns, that is nearest to `near`, rad.
+pub(crate) fn nearest_turn(angle: f64, near: f64) -> f64 {
+    angle + TAU * ((near - angle) / TAU).round()
+}
+
 /// The axes of a frame in the world.
 pub(crate) fn axes(frame: Pose) -> [DVec3; 3] {
     let m = DMat3::from_quat(frame.rotation);
@@ -260,8 +289,6 @@ pub(crate) fn axes(frame: Pose) -> [DVec3; 3] {
 
 #[cfg(test)]
 mod tests {
-    use glam::DQuat;
-
     use super::*;
 
     #[test]

@@ -238,9 +238,10 @@ fn vertices(asset: &TeSdf) -> Vec<DVec3> {
     vertices
 }
 
-/// The unit normal of each face, by its id.
+/// The unit normal of each face, by its id. Ids have gaps where faces of the mesh are no surface.
 fn normals_of_faces(asset: &TeSdf) -> Vec<DVec3> {
-    let mut normals = vec![DVec3::ZERO; asset.face_count()];
+    let ids = (0..asset.face_count()).map(|face| asset.face_id(face) as usize + 1);
+    let mut normals = vec![DVec3::ZERO; ids.max().unwrap_or(0)];
     for face in 0..asset.face_count() {
         let [p, q, r] = asset.face_corners(face);
         normals[asset.face_id(face) as usize] = (q - p).cross(r - p).normalize_or_zero();

@@ -9,7 +9,7 @@ use tesdf::collide::Pose;
 
 use super::integrate::pack;
 use super::rows::{Bodies, PUSHES, Resistance, Row, RowId, Stiffness};
-use crate::joint::{JointResistance, axes, rotation_between, swing, wrapped};
+use crate::joint::{JointResistance, axes, nearest_turn, rotation_between, swing, wrapped};
 use crate::{Drive, Joint, JointKind, Mass, System};
 
 /// A direction in which a joint measures an error: of the translation at a point, or of the
@@ -61,29 +61,30 @@ pub fn impact_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
 }
 
 fn rows(bodies: &Bodies<'_>, h: f64, change: impl Fn(Measure) -> Measure) -> Vec<Row> {
-    let of_joint = |joint: &Joint| {
+    let of_joint = |(joint, &near): (&Joint, &f64)| {
         let states = bodies.system.states();
         let poses = System::poses_of(joint, states);
         let point = joint.frames_in_world(poses)[1].translation;
         let row = |measure: Measure| row(joint, change(measure), point, bodies, h);
-        measures(joint, poses, bodies.system.rate_of(joint, states), h)
+        measures(joint, poses, near, bodies.system.rate_of(joint, states), h)
             .into_iter()
             .map(row)
             .collect::<Vec<_>>()
     };
-    let rows = bodies.system.joints().iter().flat_map(of_joint);
+    let rows = bodies.system.joints().iter().zip(bodies.system.coordinates()).flat_map(of_joint);
     rows.enumerate().map(|(k, row)| Row { id: RowId::Joint(k), ..row }).collect()
 }
 
 /// Sets the gaps of `rows`, which are those of all joints, to the errors at the poses that
 /// `velocities` predict.
 pub fn predict(rows: &mut [Row], bodies: &Bodies<'_>, poses: &[Pose], velocities: &[Vector6<f64>], h: f64) {
-    let of_joint = |joint: &Joint| {
+    let of_joint = |(joint, &near): (&Joint, &f64)| {
         let parent = joint.parent.map_or(Pose::IDENTITY, |parent| poses[parent]);
         // The rate matters for no position.
-        measures(joint, [parent, poses[joint.child]], 0.0, h)
+        measures(joint, [parent, poses[joint.child]], near, 0.0, h)
     };
-    for (row, measure) in rows.iter_mut().zip(bodies.system.joints().iter().flat_map(of_joint)) {
+    let joints = bodies.system.joints().iter().zip(bodies.system.coordinates());
+    for (row, measure) in rows.iter_mut().zip(joints.flat_map(of_joint)) {
         if let Error::Position(error) = measure.error {
             row.gap = error - h * row.rate(velocities);
             row.relaxed_gap = row.gap;
@@ -108,9 +109,10 @@ pub fn row_count(joint: &Joint) -> usize {
     held + limits + resisting + usize::from(joint.motor.is_some())
 }
 
-/// The measures of a joint. Their number depends on the joint alone. `before` is the rate of its
-/// coordinate at the beginning of the step.
-fn measures(joint: &Joint, poses: [Pose; 2], before: f64, h: f64) -> Vec<Measure> {
+/// The measures of a joint. Their number depends on the joint alone. The angle of a hinge is the one
+/// of all turns that is nearest to `near`. `before` is the rate of its coordinate at the beginning of
+/// the step.
+fn measures(joint: &Joint, poses: [Pose; 2], near: f64, before: f64, h: f64) -> Vec<Measure> {
     let [a, b] = joint.frames_in_world(poses);
     let [x, y, z] = axes(a);
     let (way, turn) = (b.translation - a.translation, rotation_between(a, b));
@@ -132,7 +134,10 @@ fn measures(joint: &Joint, poses: [Pose; 2], before: f64, h: f64) -> Vec<Measure
         }
         JointKind::Slider => vec![along(x), along(y), about(x, turn), about(y, turn), about(z, turn)],
     };
-    let coordinate = joint.coordinate(poses);
+    let coordinate = match joint.kind {
+        JointKind::Hinge => nearest_turn(joint.coordinate(poses), near),
+        _ => joint.coordinate(poses),
+    };
     let axis = match joint.kind {
         JointKind::Slider => Direction::Along(z),
         JointKind::Hinge | JointKind::Weld => Direction::About(z),

@@ -5,13 +5,17 @@
 //! `urdf-rs` 0.10.0 names no line in its errors, refuses a file because of parts that have no mesh,
 //! and depends on two XML parsers that nobody maintains.
 mod bounds;
+mod description;
 mod include;
 mod packages;
+mod urdf;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+pub use description::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, Unread, composed};
 pub use include::expand;
 pub use packages::Packages;
+pub use urdf::{mesh_reference, read_urdf};
 
 /// Formats of robot descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +72,23 @@ impl RobotFormat {
                 }
             }
             _ => Ok(None),
+        }
+    }
+}
+
+impl Robot {
+    /// Reads the robot description at `path`. Meshes of URDF are found in `packages`, by their names,
+    /// and where [`Packages`] looks.
+    ///
+    /// # Errors
+    /// It cannot be read, or links and joints are no tree.
+    pub fn read(path: &Path, packages: &[(String, PathBuf)]) -> Result<Self, RobotError> {
+        match RobotFormat::of_path(path)? {
+            Some(RobotFormat::Urdf) => read_urdf(path, &Packages::new(path, packages)),
+            Some(RobotFormat::Mjcf) => {
+                Err(RobotError::in_file(path, "robots of scenes are read from URDF so far; give a URDF file"))
+            }
+            None => Err(RobotError::in_file(path, "expected a robot description: .urdf, .xml or .mjcf")),
         }
     }
 }

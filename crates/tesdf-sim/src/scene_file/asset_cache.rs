@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use tesdf::TeSdf;
 use tesdf::base::Inside;
-use tesdf::mesh::{LoadedMesh, RepairMode, read};
+use tesdf::mesh::{LoadedMesh, RepairMode, TriangleMesh, read};
 
 /// Part of the keys: it is raised when the encoder makes other bytes of the same mesh.
 const ENCODER: u32 = 1;
@@ -50,7 +50,7 @@ impl AssetCache {
         &self.folder
     }
 
-    /// The mesh files that were encoded so far because they were not in it.
+    /// The mesh files, or bodies of several parts, that were encoded so far because they were not in it.
     pub fn encoded(&self) -> Vec<PathBuf> {
         self.encoded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -67,7 +67,30 @@ impl AssetCache {
         repair: RepairMode,
         encode: impl FnOnce() -> Result<TeSdf, E>,
     ) -> Result<TeSdf, E> {
-        let key = || read(file).ok().map(|mesh| key(file, &mesh, inside, repair));
+        self.keep(file, || read(file).ok().map(|mesh| key(file, &mesh, inside, repair)), encode)
+    }
+
+    /// As [`get`](Self::get), for a mesh that is made of several, of the body `name`.
+    pub(super) fn of_mesh<E>(
+        &self,
+        name: &str,
+        mesh: &TriangleMesh,
+        inside: Inside,
+        encode: impl FnOnce() -> Result<TeSdf, E>,
+    ) -> Result<TeSdf, E> {
+        let key = || {
+            let options = format!("{} {ENCODER} {inside} parts", env!("CARGO_PKG_VERSION"));
+            Some(hashed(&options, mesh))
+        };
+        self.keep(Path::new(name), key, encode)
+    }
+
+    fn keep<E>(
+        &self,
+        file: &Path,
+        key: impl Fn() -> Option<String>,
+        encode: impl FnOnce() -> Result<TeSdf, E>,
+    ) -> Result<TeSdf, E> {
         // A file that cannot be read has no key, and `encode` says why.
         let before = key();
         let path = before.as_ref().map(|key| self.folder.join(format!("{key}.tesdf")));
@@ -96,12 +119,16 @@ fn key(
     inside: Inside,
     repair: RepairMode,
 ) -> String {
-    let mut hash = blake3::Hasher::new();
     let mut options = format!("{} {ENCODER} {inside} {repair:?}", env!("CARGO_PKG_VERSION"));
     // The asset tells the name of its file.
     let _ = write!(options, " {} {}", report.source_blake3, file.display());
-    hash.update(options.as_bytes());
     // What Gmsh makes of a file depends on its version.
+    hashed(&options, mesh)
+}
+
+fn hashed(options: &str, mesh: &TriangleMesh) -> String {
+    let mut hash = blake3::Hasher::new();
+    hash.update(options.as_bytes());
     hash.update(bytemuck::cast_slice(mesh.vertices()));
     hash.update(bytemuck::cast_slice(mesh.faces()));
     hash.finalize().to_hex().to_string()

@@ -9,9 +9,10 @@ use tesdf::collide::{
 };
 use tesdf::encode::{EncodeChoices, EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DMat3, DQuat, DVec3};
-use tesdf::mesh::{RepairMode, UnknownRepair};
+use tesdf::mesh::{RepairMode, SolidMesh, UnknownRepair};
 use tesdf::{Length, Progress, TeSdf};
 
+use super::parts::joined;
 use super::read::LoadedScene;
 use super::units::Measure;
 use super::{BodySection, DetectorSection, SceneError, ShapeSection};
@@ -171,11 +172,15 @@ fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions
     }
 }
 
-/// Diagonal of the smallest free body, m; 0 when there is none.
+/// Diagonal of the smallest free body that can meet others, m; 0 when there is none.
 fn smallest_free_body(system: &System) -> f64 {
-    let free = system.bodies().iter().filter(|body| body.mass != Mass::Fixed);
+    let meets = |id| system.scene().instance(id).is_ok_and(|instance| instance.groups.filter != 0);
+    let free = system.bodies().iter().filter(|body| body.mass != Mass::Fixed && meets(body.instance));
     free.filter_map(|body| system.diagonal(body).ok()).reduce(f64::min).unwrap_or(0.0)
 }
+
+/// What is wrong with a body of several geometries.
+const SEVERAL: &str = "more than one of asset, mesh, shape and parts is given; keep one";
 
 enum ShapeFailure {
     Cancelled,
@@ -196,6 +201,20 @@ impl Shapes {
     ) -> Result<ShapeId, ShapeFailure> {
         let inside = inside(body).map_err(ShapeFailure::Reason)?;
         let repair = repair(body).map_err(ShapeFailure::Reason)?;
+        if !body.parts.is_empty() {
+            if body.asset.is_some() || body.mesh.is_some() || body.shape.is_some() {
+                return Err(ShapeFailure::Reason(SEVERAL.into()));
+            }
+            // The parts of two bodies are the same where their text is.
+            let key = (PathBuf::new(), format!("{:?}, {repair:?}", body.parts));
+            if let Some(&shape) = self.0.get(&key) {
+                return Ok(shape);
+            }
+            let encoded = encode_parts(scene, body, repair, progress)?;
+            let shape = add_shape(system, Shape::Mesh(Arc::new(encoded)))?;
+            self.0.insert(key, shape);
+            return Ok(shape);
+        }
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
@@ -223,14 +242,11 @@ impl Shapes {
             (None, None, Some(shape)) => shape.to_shape(),
             (None, None, None) => {
                 return Err(ShapeFailure::Reason(
-                    "it has no geometry; give asset = \"FILE.tesdf\", mesh = \"FILE\" or a shape".into(),
+                    "it has no geometry; give asset = \"FILE.tesdf\", mesh = \"FILE\", a shape or parts"
+                        .into(),
                 ));
             }
-            _ => {
-                return Err(ShapeFailure::Reason(
-                    "more than one of asset, mesh and shape is given; keep one".into(),
-                ));
-            }
+            _ => return Err(ShapeFailure::Reason(SEVERAL.into())),
         };
         add_shape(system, shape)
     }
@@ -246,6 +262,7 @@ fn repair(body: &BodySection) -> Result<RepairMode, String> {
     let mode = mode.map_err(|e: UnknownRepair| e.to_string())?;
     let without_mesh = match body {
         _ if mode == RepairMode::Never || body.mesh.is_some() => return Ok(mode),
+        BodySection { parts, .. } if parts.iter().any(|part| part.mesh.is_some()) => return Ok(mode),
         BodySection { asset: Some(_), .. } => {
             "the asset is encoded already; give mesh = \"FILE\" in place of asset"
         }
@@ -286,6 +303,29 @@ fn encode_mesh(
         EncodeFileError::Encode { source: EncodeError::Cancelled, .. } => ShapeFailure::Cancelled,
         e => ShapeFailure::Reason(e.to_string()),
     })
+}
+
+/// Encodes the parts of a body as one mesh.
+fn encode_parts(
+    scene: &LoadedScene,
+    body: &BodySection,
+    repair: RepairMode,
+    progress: &Progress,
+) -> Result<TeSdf, ShapeFailure> {
+    let (mesh, inside) = joined(scene, &body.parts, repair).map_err(ShapeFailure::Reason)?;
+    let encode = || {
+        let solid = SolidMesh::with_repair(mesh.clone(), inside, RepairMode::Never);
+        let solid = solid.map_err(|e| ShapeFailure::Reason(format!("the parts together: {e}")))?.0;
+        let encoder = Encoder::new().preset(Preset::Fast).inside(inside).progress(progress);
+        encoder.encode(&solid).map_err(|e| match e {
+            EncodeError::Cancelled => ShapeFailure::Cancelled,
+            e => ShapeFailure::Reason(e.to_string()),
+        })
+    };
+    match &scene.assets {
+        Some(assets) => assets.of_mesh(&body.name, &mesh, inside, encode),
+        None => encode(),
+    }
 }
 
 impl ShapeSection {

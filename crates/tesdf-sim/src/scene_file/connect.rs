@@ -54,7 +54,8 @@ fn joint(system: &System, section: &JointSection) -> Result<Joint, String> {
     let anchor = section.anchor.map_or(pose(child).translation, DVec3::from_array);
     let frame = Pose::new(anchor, DQuat::from_rotation_arc(DVec3::Z, axis)).map_err(|e| e.to_string())?;
     let poses = [parent.map_or(Pose::IDENTITY, pose), pose(child)];
-    let joint = Joint::new(&section.name, section.kind, (parent, child), poses, frame);
+    let mut joint = Joint::new(&section.name, section.kind, (parent, child), poses, frame);
+    joint.begin_at(section.coordinate)?;
     Ok(Joint { limits: section.limits, motor: section.motor, resistance: section.resistance, ..joint })
 }
 

@@ -27,6 +27,11 @@
 //! copies = { count = 10, translation = [0.029, 0, 0], rotation = [0.707106781186548, 0, 0, 0.707106781186548] }
 //! friction = 0.2               # with another body: the geometric mean of both
 //!
+//! [[robots]]
+//! file = "arm.urdf"            # its links become bodies, its joints joints
+//! fixed = true
+//! coordinates = { elbow = 0.5 }
+//!
 //! [[joints]]
 //! name = "spindle"
 //! kind = "hinge"               # or weld, ball, slider
@@ -57,7 +62,9 @@ mod connect;
 mod copies;
 mod error;
 mod limits;
+mod parts;
 mod read;
+mod robots;
 mod units;
 
 use std::path::PathBuf;
@@ -72,7 +79,9 @@ pub use asset_cache::AssetCache;
 pub use copies::CopiesSection;
 pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
+pub use parts::{PartSection, PartShape};
 pub use read::LoadedScene;
+pub use robots::{RobotMotor, RobotSection};
 
 use crate::criterion::CriterionSection;
 use crate::newton::NewtonOptions;
@@ -104,6 +113,9 @@ pub struct SceneFile {
     pub criterion: CriterionSection,
     /// The bodies, at most [`MAX_BODIES`].
     pub bodies: Vec<Spanned<BodySection>>,
+    /// Robot descriptions. A loaded scene has their links as bodies, after the others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub robots: Vec<RobotSection>,
     /// Coefficients of friction of pairs of bodies, in place of those that follow from the bodies.
     #[serde(default)]
     pub friction: Vec<FrictionSection>,
@@ -158,8 +170,11 @@ pub struct JointSection {
     /// frame, with the bodies where they start.
     #[serde(default = "up")]
     pub axis: [f64; 3],
-    /// Bounds of a hinge's angle, rad, or of a slider's travel, m, which are 0 at the start. Of a
-    /// ball: 0 and the greatest angle of its axis, rad.
+    /// The angle of a hinge, rad within ±π, or the travel of a slider, m, where the bodies start.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub coordinate: f64,
+    /// Bounds of a hinge's angle, rad, or of a slider's travel, m. Of a ball: 0 and the greatest angle
+    /// of its axis, rad.
     #[serde(default)]
     pub limits: Option<[f64; 2]>,
     /// Drives a hinge or a slider.
@@ -170,6 +185,29 @@ pub struct JointSection {
     pub resistance: JointResistance,
 }
 
+impl JointSection {
+    /// A joint with the world and the defaults of a scene file.
+    fn new(name: String, kind: JointKind, child: String) -> Self {
+        Self {
+            name,
+            kind,
+            parent: None,
+            child,
+            anchor: None,
+            axis: up(),
+            coordinate: 0.0,
+            limits: None,
+            motor: None,
+            resistance: JointResistance::default(),
+        }
+    }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
 fn up() -> [f64; 3] {
     [0.0, 0.0, 1.0]
 }
@@ -178,7 +216,7 @@ fn earth() -> [f64; 3] {
     [0.0, 0.0, -9.81]
 }
 
-/// A body. Exactly one of `asset`, `mesh` and `shape` gives its geometry.
+/// A body. Exactly one of `asset`, `mesh`, `shape` and `parts` gives its geometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BodySection {
@@ -210,6 +248,9 @@ pub struct BodySection {
     /// A simple shape.
     #[serde(default)]
     pub shape: Option<ShapeSection>,
+    /// Meshes and simple shapes that are one body together. It is encoded as a mesh.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<PartSection>,
     /// Metres per unit of the mesh or shape.
     #[serde(default = "one")]
     pub scale: f64,
@@ -263,6 +304,40 @@ pub struct BodySection {
     /// The groups that it meets, as 32 bits.
     #[serde(default = "every")]
     pub filter: u32,
+}
+
+impl BodySection {
+    /// A body without geometry, with the defaults of a scene file.
+    fn new(name: String) -> Self {
+        Self {
+            name,
+            copies: None,
+            asset: None,
+            mesh: None,
+            inside: None,
+            thickness: None,
+            surface: None,
+            repair: None,
+            shape: None,
+            parts: Vec::new(),
+            scale: one(),
+            translation: [0.0; 3],
+            rotation: identity(),
+            velocity: [0.0; 3],
+            angular_velocity: [0.0; 3],
+            density: None,
+            mass: None,
+            center_of_mass: None,
+            inertia: None,
+            fixed: false,
+            kinematic: false,
+            friction: 0.0,
+            restitution: 0.0,
+            angular_damping: 0.0,
+            memberships: every(),
+            filter: every(),
+        }
+    }
 }
 
 fn every() -> u32 {

@@ -7,9 +7,11 @@ use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::asset_cache::AssetCache;
 use super::copies::expand;
-use super::{BodySection, MAX_BODIES, SceneError, SceneFile};
+use super::robots::{self, Expanded};
+use super::{BodySection, MAX_BODIES, RobotSection, SceneError, SceneFile};
 use crate::RunRecord;
 use crate::criterion::{Criteria, CriterionSection};
+use crate::robot::{Geometry, Robot, RobotError, RobotFormat};
 
 /// Maximum size of a scene file: a thousand bytes per body.
 const MAX_TEXT: usize = 1000 * MAX_BODIES;
@@ -42,6 +44,10 @@ impl LoadedScene {
     /// The same errors as [`read`](Self::read).
     pub fn read_with(path: impl AsRef<Path>, criteria: &Criteria) -> Result<Self, SceneError> {
         let path = path.as_ref();
+        if let Ok(Some(_)) = RobotFormat::of_path(path) {
+            let message = "a robot description; give it a scene: [[robots]] with file = \"…\", a time_step and a duration";
+            return Err(SceneError::Parse { path: path.to_path_buf(), message: message.into() });
+        }
         let text = tesdf::input::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.to_path_buf(), source })?;
         Self::parse_with(text, path, criteria)
@@ -87,12 +93,54 @@ impl LoadedScene {
         Self { scene, path, assets: None, text }.with_copies()
     }
 
-    /// The scene with each copy of a body as a body of its own.
+    /// The scene with each copy of a body as a body of its own, and with the bodies and joints of its
+    /// robots.
     fn with_copies(mut self) -> Result<Self, SceneError> {
         match expand(std::mem::take(&mut self.scene.bodies)) {
-            Ok(bodies) => Ok(Self { scene: SceneFile { bodies, ..self.scene }, ..self }),
-            Err((body, reason)) => Err(self.error_at(&body, reason)),
+            Ok(bodies) => self.scene.bodies = bodies,
+            Err((body, reason)) => return Err(self.error_at(&body, reason)),
         }
+        for (k, section) in std::mem::take(&mut self.scene.robots).into_iter().enumerate() {
+            let span = self.robot_span(k);
+            let at = |reason: String| {
+                let line = (!self.text.is_empty()).then(|| self.line(span.start));
+                let key = format!("robots: {}", section.file.display());
+                SceneError::Value { path: self.path.clone(), line, key, reason }
+            };
+            let robot = self.robot(&section).map_err(|e| at(e.to_string()))?;
+            let Expanded { bodies, joints, exclude } = robots::expand(&section, &robot).map_err(at)?;
+            self.scene.bodies.extend(bodies.into_iter().map(|body| Spanned::new(span.clone(), body)));
+            self.scene.joints.extend(joints);
+            self.scene.exclude.extend(exclude);
+        }
+        Ok(self)
+    }
+
+    /// Reads a robot. The paths of its meshes are relative to the scene's folder where they are
+    /// below it.
+    fn robot(&self, section: &RobotSection) -> Result<Robot, RobotError> {
+        let path = self.resolve(&section.file);
+        let packages = section.packages.iter().map(|(name, path)| (name.clone(), self.resolve(path)));
+        let packages: Vec<_> = packages.collect();
+        let mut robot = Robot::read(&path, &packages)?;
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        for collision in robot.links.iter_mut().flat_map(|link| &mut link.collisions) {
+            if let Geometry::Mesh { file, .. } = &mut collision.geometry {
+                *file = match file.strip_prefix(folder) {
+                    Ok(below) => below.to_path_buf(),
+                    Err(_) => std::path::absolute(&file).unwrap_or_else(|_| file.clone()),
+                };
+            }
+        }
+        Ok(robot)
+    }
+
+    /// Where a robot is in the text.
+    fn robot_span(&self, robot: usize) -> std::ops::Range<usize> {
+        let document = DeTable::parse(&self.text).ok();
+        let robots = document.as_ref().and_then(|document| document.get_ref().get("robots"));
+        let robots = robots.and_then(|robots| robots.get_ref().as_array());
+        robots.and_then(|robots| robots.get(robot)).map_or(0..0, Spanned::span)
     }
 
     /// The scene that is stored in a run, without its criteria, where `run` is the path of the run
@@ -183,6 +231,7 @@ impl LoadedScene {
         let mut replaced = false;
         for body in self.scene.bodies.iter_mut().map(|body| body.get_mut()).filter(|b| is_named(&b.name)) {
             replaced = true;
+            body.parts.clear();
             (body.asset, body.mesh, body.shape) = match is_asset {
                 true => (Some(file.clone()), None, None),
                 false => (None, Some(file.clone()), None),
@@ -198,11 +247,10 @@ impl LoadedScene {
     /// All files of the bodies' geometries, including every file of a mesh that has several.
     pub fn geometry_files(&self) -> Vec<PathBuf> {
         let of_body = |body: &Spanned<BodySection>| {
-            let BodySection { asset, mesh, .. } = body.get_ref();
+            let BodySection { asset, mesh, parts, .. } = body.get_ref();
             let asset = asset.iter().map(|path| self.resolve(path));
-            asset
-                .chain(mesh.iter().flat_map(|path| tesdf::mesh::files(self.resolve(path))))
-                .collect::<Vec<_>>()
+            let meshes = mesh.iter().chain(parts.iter().filter_map(|part| part.mesh.as_ref()));
+            asset.chain(meshes.flat_map(|path| tesdf::mesh::files(self.resolve(path)))).collect::<Vec<_>>()
         };
         self.scene.bodies.iter().flat_map(of_body).collect()
     }

@@ -463,7 +463,10 @@ fn joints_that_do_not_fit_are_refused() {
     let bad = [
         (Joint { child: 7, ..good.clone() }, "there is no body 7"),
         (Joint { parent: Some(bar), ..good.clone() }, "joint j: it connects a body to itself"),
-        (Joint { limits: Some([0.5, -0.5]), ..good.clone() }, "limits 0.5 to -0.5; expected two angles"),
+        (
+            Joint { limits: Some([0.5, -0.5]), ..good.clone() },
+            "limits 0.5 to -0.5; expected two finite numbers",
+        ),
         (Joint { kind: JointKind::Weld, limits: Some([0.0, 1.0]), ..good.clone() }, "a weld has no limits"),
         (Joint { kind: JointKind::Ball, motor: Some(motor), ..good.clone() }, "only hinges and sliders"),
         (

@@ -15,6 +15,7 @@ mod passing;
 mod recorded_warnings;
 mod rest;
 mod restitution;
+mod robots;
 mod scene_file;
 mod scene_file_page;
 mod screw;

@@ -43,6 +43,8 @@ enum Kind {
     List,
     /// A table with these keys.
     Table(Vec<String>),
+    /// A table with any keys.
+    Map,
     /// The name of one of these variants, or a table with one of them as its only key.
     Choice(Vec<String>),
     /// Nothing but the name of a variant.
@@ -90,7 +92,11 @@ impl Place {
     }
 
     fn kind(&self) -> Kind {
-        let message = self.read("{ \"?\" = 0 }").expect_err("an unknown key was accepted");
+        // A map of numbers takes any key, and other maps refuse the value alone.
+        let Err(message) = self.read("{ \"?\" = 0 }") else { return Kind::Map };
+        if message.starts_with("invalid type: integer `0`, expected ") {
+            return Kind::Map;
+        }
         let names = || code_spans(&message).skip(1).map(String::from).collect();
         if message.starts_with("unknown field `?`") {
             return Kind::Table(names());
@@ -131,6 +137,7 @@ impl Place {
             Kind::List => "[]".into(),
             Kind::Array(length) => format!("[{}]", vec![self.entry().sample(); length].join(", ")),
             Kind::Table(keys) => table(&self.required(&keys)),
+            Kind::Map => "{}".into(),
             Kind::Choice(names) => {
                 let place = self.key(&names[0], &BTreeMap::new());
                 match place.kind() {
@@ -166,6 +173,7 @@ impl Place {
         match self.kind() {
             Kind::Value(name) => name.into(),
             Kind::Table(_) => "table".into(),
+            Kind::Map => "table by name".into(),
             Kind::Choice(names) => {
                 names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
             }
@@ -191,7 +199,7 @@ impl Place {
                 }
             }
             Kind::List => self.entry().collect(path, found),
-            Kind::Value(_) | Kind::Array(_) | Kind::Name => {}
+            Kind::Value(_) | Kind::Array(_) | Kind::Map | Kind::Name => {}
         }
     }
 

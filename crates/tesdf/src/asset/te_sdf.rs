@@ -369,8 +369,8 @@ impl TeSdf {
         self.faces[position]
     }
 
-    /// Id, in the source mesh, of the face at `position`, its place in the file. It is below
-    /// [`face_count`](Self::face_count).
+    /// Id, in the source mesh, of the face at `position`, its place in the file. It may be
+    /// [`face_count`](Self::face_count) or more where faces of the source are no surface.
     pub fn face_id(&self, position: usize) -> u32 {
         self.face_ids[position]
     }

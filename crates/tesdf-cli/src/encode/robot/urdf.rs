@@ -2,8 +2,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::terminal::report::Failure;
-use tesdf::glam::{DAffine3, DVec3};
-use tesdf_sim::robot::{Packages, parse, read};
+use tesdf::glam::DAffine3;
+use tesdf_sim::robot::{Packages, mesh_reference, parse, read};
 
 use super::MeshUse;
 use crate::encode_all::meshes::Use;
@@ -35,19 +35,7 @@ pub(super) fn uses(path: &Path, named: &[(String, PathBuf)]) -> Result<Vec<MeshU
                 .flat_map(|node| node.children())
                 .find(|node| node.has_tag_name("mesh"));
             let Some(mesh) = mesh else { continue };
-            let Some(reference) = mesh.attribute("filename").map(str::trim).filter(|name| !name.is_empty())
-            else {
-                return Err(Failure::new(format!("{}: <mesh> has no filename; expected one", at(mesh))));
-            };
-            let scale = match mesh.attribute("scale") {
-                None => DVec3::ONE,
-                Some(text) => scale(text).ok_or_else(|| {
-                    Failure::new(format!(
-                        "{}: the scale is '{text}'; expected three numbers other than 0",
-                        at(mesh)
-                    ))
-                })?,
-            };
+            let (reference, scale) = mesh_reference(path, &document, mesh).map_err(Failure::new)?;
             found.push(MeshUse {
                 reference: reference.to_owned(),
                 path: packages.resolve(reference),
@@ -61,15 +49,4 @@ pub(super) fn uses(path: &Path, named: &[(String, PathBuf)]) -> Result<Vec<MeshU
         }
     }
     Ok(found)
-}
-
-/// Three numbers, or one for all axes, as some files have it.
-fn scale(text: &str) -> Option<DVec3> {
-    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
-    let scale = match numbers?[..] {
-        [all] => DVec3::splat(all),
-        [x, y, z] => DVec3::new(x, y, z),
-        _ => return None,
-    };
-    (scale.is_finite() && scale.cmpne(DVec3::ZERO).all()).then_some(scale)
 }

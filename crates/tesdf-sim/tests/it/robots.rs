@@ -1,0 +1,246 @@
+//! Robots of scenes: the poses of their links, their masses, what they touch, and what is refused.
+use std::path::{Path, PathBuf};
+
+use tesdf::glam::{DAffine3, DMat3, DVec3};
+use tesdf_sim::scene_file::{LoadedScene, SceneError};
+use tesdf_sim::{Dynamics, Mass, System};
+
+fn data() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/robots")
+}
+
+fn load(robot: &str, rest: &str) -> Result<LoadedScene, SceneError> {
+    let text = format!("time_step = 1e-3\nduration = 0.1\nbodies = []\n{rest}\n[[robots]]\n{robot}");
+    LoadedScene::parse(text, data().join("scene.toml"))
+}
+
+/// The scene of a robot of this text.
+fn load_text(urdf: &str, keys: &str) -> Result<LoadedScene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("robot.urdf"), urdf).unwrap();
+    let text =
+        format!("time_step = 1e-3\nduration = 0.1\nbodies = []\n[[robots]]\nfile = 'robot.urdf'\n{keys}");
+    LoadedScene::parse(text, folder.path().join("scene.toml"))
+}
+
+fn refusal(urdf: &str, keys: &str) -> String {
+    let loaded = load_text(urdf, keys).and_then(|loaded| loaded.system().map(|_| ()));
+    loaded.expect_err("it was accepted").to_string()
+}
+
+fn body(system: &System, name: &str) -> usize {
+    system.bodies().iter().position(|body| body.name == name).unwrap_or_else(|| panic!("no body {name}"))
+}
+
+/// `<origin>`, by products of matrices.
+fn origin(xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> DAffine3 {
+    let turn = DMat3::from_rotation_z(yaw) * DMat3::from_rotation_y(pitch) * DMat3::from_rotation_x(roll);
+    DAffine3::from_mat3_translation(turn, xyz.into())
+}
+
+/// Rodrigues' formula.
+fn about(axis: DVec3, angle: f64) -> DAffine3 {
+    let k = axis.normalize();
+    let cross = DMat3::from_cols(k.cross(DVec3::X), k.cross(DVec3::Y), k.cross(DVec3::Z));
+    DAffine3::from_mat3(DMat3::IDENTITY + cross * angle.sin() + cross * cross * (1.0 - angle.cos()))
+}
+
+const Q: [(&str, f64); 6] =
+    [("pan", 0.7), ("lift", 0.4), ("elbow", -0.9), ("roll", 2.5), ("bend", 0.6), ("reach", 0.03)];
+
+fn arm() -> String {
+    let coordinates: Vec<_> = Q.iter().map(|(name, q)| format!("{name} = {q}")).collect();
+    format!(
+        "file = 'peg-arm.urdf'\nprefix = 'a/'\nfixed = true\ntranslation = [0.2, -0.1, 0.3]\n\
+         rotation = [0, 0, 0.6, 0.8]\ncoordinates = {{ {} }}",
+        coordinates.join(", ")
+    )
+}
+
+#[test]
+fn links_are_where_the_product_of_transforms_puts_them() {
+    let system = load(&arm(), "").unwrap().system().unwrap();
+    let quarter = 2.0 * 0.6_f64.atan2(0.8);
+    let mut frame = DAffine3::from_translation(DVec3::new(0.2, -0.1, 0.3)) * about(DVec3::Z, quarter);
+    let mut expected = vec![("base", frame)];
+    let [pan, lift, elbow, roll, bend, reach] = Q.map(|(_, q)| q);
+    for (name, origin, motion) in [
+        ("shoulder", origin([0.0, 0.0, 0.1], [0.0; 3]), about(DVec3::Z, pan)),
+        ("upper", origin([0.0, 0.09, 0.08], [0.0, 0.1, 0.0]), about(DVec3::Y, lift)),
+        ("fore", origin([0.0, -0.07, 0.3], [0.05, 0.0, 0.02]), about(DVec3::Y, elbow)),
+        ("wrist", origin([0.0, 0.0, 0.26], [0.0; 3]), about(DVec3::NEG_Z, roll)),
+        ("hand", origin([0.0, 0.0, 0.06], [0.0; 3]), about(DVec3::new(0.6, 0.8, 0.0), bend)),
+        ("tool", origin([0.0, 0.0, 0.05], [0.0; 3]), DAffine3::from_translation(DVec3::Z * reach)),
+        ("peg", origin([0.0, 0.0, 0.06], [0.0, 0.0, 0.5]), DAffine3::IDENTITY),
+    ] {
+        frame = frame * origin * motion;
+        expected.push((name, frame));
+    }
+    for (name, frame) in expected {
+        let found = system.states()[body(&system, &format!("a/{name}"))].pose;
+        let found = DAffine3::from_rotation_translation(found.rotation, found.translation);
+        assert!(found.abs_diff_eq(frame, 1e-12), "{name}: {found}, expected {frame}");
+    }
+    // The flange is a part of the tool, and the base never moves.
+    assert!(system.bodies().iter().all(|body| body.name != "a/flange"));
+    assert_eq!(system.bodies()[body(&system, "a/base")].mass, Mass::Fixed);
+    let names: Vec<_> = system.joints().iter().map(|joint| joint.name.as_str()).collect();
+    let all = ["pan", "lift", "elbow", "roll", "bend", "reach", "to_peg", "to_camera"];
+    assert!(all.iter().all(|name| names.contains(&format!("a/{name}").as_str())), "{names:?}");
+    for (name, q) in Q {
+        let joint = names.iter().position(|found| *found == format!("a/{name}")).unwrap();
+        assert!((system.coordinates()[joint] - q).abs() < 1e-12, "{name}: {}", system.coordinates()[joint]);
+        let (way, turn) =
+            system.joints()[joint].error(System::poses_of(&system.joints()[joint], system.states()));
+        assert!(way < 1e-12 && turn < 1e-12, "{name} is open by {way} m, {turn} rad");
+    }
+}
+
+#[test]
+fn masses_are_those_of_the_file_and_geometries_those_of_the_parts() {
+    let system = load(&arm(), "").unwrap().system().unwrap();
+    let mass = |name: &str| match system.bodies()[body(&system, name)].mass {
+        Mass::Free(mass) => mass,
+        other => panic!("{name} is {other:?}"),
+    };
+    let upper = mass("a/upper");
+    assert_eq!((upper.mass, upper.center), (2.0, DVec3::new(0.0, 0.0, 0.14)));
+    let turn = DMat3::from_rotation_z(0.3) * DMat3::from_rotation_x(0.2);
+    let inertia = turn * DMat3::from_diagonal(DVec3::new(0.02, 0.0195, 0.003)) * turn.transpose();
+    assert!(upper.inertia.abs_diff_eq(inertia, 1e-15), "{}", upper.inertia);
+    // The bar's top at 0.29 is within the knuckle, whose round is at 0.34; the knuckle's side is at
+    // y = 0.03, that of the bar at 0.025.
+    let scene = system.scene();
+    let at = |name: &str, p: [f64; 3]| {
+        let instance = scene.instance(system.bodies()[body(&system, name)].instance).unwrap();
+        match scene.shape(instance.shape).unwrap() {
+            tesdf::collide::Shape::Mesh(asset) => asset.signed_distance(p.into()),
+            other => panic!("{name} is {other:?}"),
+        }
+    };
+    assert!((at("a/upper", [0.0, 0.0, 0.35]) - 0.01).abs() < 0.04 * 1.3e-3);
+    assert!((at("a/upper", [0.0, 0.035, 0.3]) - 0.005).abs() < 1e-12);
+    assert!((at("a/upper", [0.0, 0.035, 0.1]) - 0.01).abs() < 1e-12);
+    assert!(at("a/upper", [0.0, 0.0, 0.28]) < -0.015, "the place within both is inside");
+    assert!((at("a/wrist", [0.0, 0.0, 0.06]) - 0.01).abs() < 0.03 * 2.5e-3);
+    // The camera has a mass, and nothing that it could touch with.
+    let camera = scene.instance(system.bodies()[body(&system, "a/camera")].instance).unwrap();
+    assert_eq!((mass("a/camera").mass, camera.groups.filter), (0.05, 0));
+}
+
+#[test]
+fn limits_beyond_a_turn_hold_and_motors_have_the_effort_of_the_file() {
+    let motors =
+        "motors = { roll = { drive = { velocity = 40 } }, pan = { drive = { position = 0 }, limit = 3 } }";
+    let keys = "file = 'peg-arm.urdf'\nfixed = true\nself_contacts = false\n";
+    let loaded = load(&format!("{keys}{motors}"), "gravity = [0, 0, 0]").unwrap();
+    let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
+    let joint = |name: &str| engine.system().joints().iter().position(|joint| joint.name == name).unwrap();
+    let (roll, pan) = (joint("roll"), joint("pan"));
+    let limits = [roll, pan].map(|joint| engine.system().joints()[joint].motor.unwrap().limit);
+    assert_eq!(limits, [20.0, 3.0]);
+    for _ in 0..300 {
+        engine.step(1e-3).unwrap();
+    }
+    let found = engine.system().coordinates()[roll];
+    assert!((found - 6.2).abs() < 1e-6, "the roll is at {found}; its limit is 6.2");
+}
+
+/// Two fingers, whose boxes overlap each other and that of the palm.
+const FINGERS: &str = r#"<robot name="r">
+  <link name="palm"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+    <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+  <joint name="j1" type="prismatic"><parent link="palm"/><child link="one"/><limit lower="-1" upper="1"/></joint>
+  <link name="one"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+    <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+  <joint name="j2" type="prismatic"><parent link="palm"/><child link="two"/><origin xyz="0 0.09 0"/><limit lower="-1" upper="1"/></joint>
+  <link name="two"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+    <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+</robot>"#;
+
+#[test]
+fn neighbours_do_not_touch_and_others_do_unless_told() {
+    let contacts = |keys: &str| {
+        let loaded = load_text(FINGERS, keys).unwrap();
+        let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
+        engine.step(1e-3).unwrap();
+        let bodies = |id| engine.system().body_of(id).unwrap();
+        let pairs = engine.contacts().iter().map(|c| [bodies(c.instance_a), bodies(c.instance_b)]);
+        let mut pairs: Vec<_> = pairs.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    };
+    assert_eq!(contacts("fixed = true"), [[1, 2]]);
+    assert_eq!(contacts(""), [[1, 2]]);
+    assert_eq!(contacts("self_contacts = false"), [[0; 2]; 0]);
+    // Fingers that start apart do not touch.
+    assert_eq!(contacts("coordinates = { j1 = 0.3, j2 = -0.3 }"), [[0; 2]; 0]);
+}
+
+#[test]
+fn a_frame_without_mass_is_a_part_of_what_is_fixed_to_it() {
+    let urdf = r#"<robot name="r"><link name="foot"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
+      <joint name="to_mid" type="fixed"><parent link="foot"/><child link="mid"/><origin xyz="0 0 0.1"/></joint><link name="mid"/>
+      <joint name="to_body" type="fixed"><parent link="mid"/><child link="body"/><origin xyz="0 0 0.2"/></joint>
+      <link name="body"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link></robot>"#;
+    let system = load_text(urdf, "translation = [0, 0, 1]").unwrap().system().unwrap();
+    assert_eq!((system.bodies().len(), system.joints().len()), (1, 0));
+    assert_eq!(system.bodies()[0].name, "body");
+    assert!(system.states()[0].pose.translation.abs_diff_eq(DVec3::new(0.0, 0.0, 1.3), 1e-15));
+    let scene = system.scene();
+    let shape = scene.instance(system.bodies()[0].instance).unwrap().shape;
+    let tesdf::collide::Shape::Mesh(asset) = scene.shape(shape).unwrap() else { panic!("it has no mesh") };
+    assert!((asset.signed_distance(DVec3::new(0.0, 0.0, -0.3)) + 0.02).abs() < 1e-4);
+    // Fixed, it is the foot alone, as nothing else can touch.
+    let system = load_text(urdf, "fixed = true").unwrap().system().unwrap();
+    assert_eq!(system.bodies()[0].name, "foot");
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_with_its_place_and_a_cure() {
+    let mimic = FINGERS.replace("<child link=\"two\"/>", "<child link=\"two\"/>\n<mimic joint=\"j1\"/>");
+    let told = refusal(&mimic, "");
+    assert!(told.contains("scene.toml, line 4: robots: robot.urdf: "), "{told}");
+    assert!(
+        told.contains("robot.urdf, line 8: the joint j2 follows another one")
+            && told.contains("ignore = [\"mimic\"]"),
+        "{told}"
+    );
+    assert!(load_text(&mimic, "ignore = ['mimic']").is_ok());
+    for (from, to, keys, expected) in [
+        ("prismatic", "planar", "", "line 4: the joint j1 is planar; expected two prismatic"),
+        ("prismatic", "odd", "", "the type of the joint j1 is 'odd'; expected revolute"),
+        ("<child link=\"one\"/>", "<child link=\"none\"/>", "", "line 4: there is no link none"),
+        ("<child link=\"two\"/>", "<child link=\"one\"/>", "", "the link one is the child of two joints"),
+        (
+            "<parent link=\"palm\"/><child link=\"two\"/>",
+            "<parent link=\"two\"/><child link=\"two\"/>",
+            "",
+            "line 8: the link two is in a circle",
+        ),
+        ("<mass value=\"1\"/>", "<mass value=\"0\"/>", "", "line 2: the link palm moves and has no mass"),
+        ("izz=\"1\"", "izz=\"3\"", "", "line 2: moments of inertia"),
+        (
+            "<box size=\"0.1 0.1 0.1\"/>",
+            "<box size=\"0.1 0.1\"/>",
+            "",
+            "line 3: size of <box> is '0.1 0.1'; expected 3 finite numbers",
+        ),
+        ("<box size=\"0.1 0.1 0.1\"/>", "<ellipsoid/>", "", "the geometry <ellipsoid> is not known"),
+        ("<limit lower=\"-1\" upper=\"1\"/>", "", "", "the joint j1 is prismatic and has no <limit>"),
+        (
+            "",
+            "",
+            "coordinates = { j3 = 1 }",
+            "coordinates: the robot has no joint j3 that turns or slides; expected one of j1, j2",
+        ),
+        ("", "", "motors = { j1 = { drive = { velocity = 1 } } }", "motors: that of j1 has no limit"),
+        ("", "", "file2 = 'x'", "unknown field `file2`"),
+    ] {
+        let told = refusal(&FINGERS.replacen(from, to, 1), keys);
+        assert!(told.contains(expected), "{told}\nexpected {expected}");
+    }
+    let told = LoadedScene::read(data().join("peg-arm.urdf")).expect_err("it was read").to_string();
+    assert!(told.contains("a robot description; give it a scene: [[robots]]"), "{told}");
+}
