@@ -11,6 +11,8 @@ use crate::MassProperties;
 pub struct Robot {
     /// The links.
     pub links: Vec<Link>,
+    /// Pairs of links that have no contacts with each other.
+    pub apart: Vec<[usize; 2]>,
     /// Elements that neither bodies nor joints obey, and what they are: who reads them may refuse
     /// them or leave them out.
     pub unread: Vec<Unread>,
@@ -43,6 +45,13 @@ pub struct Link {
     /// The bits of its groups, and of those that it meets: two links meet where one of them meets a
     /// group of the other.
     pub groups: [u32; 2],
+}
+
+impl Link {
+    /// Whether it is what does not move and is no part of the robot, as the world of MJCF.
+    pub(crate) fn is_world(&self) -> bool {
+        matches!(self.base, Base::Root { is_fixed: Some(true), .. })
+    }
 }
 
 /// How a link is connected to what comes before it.

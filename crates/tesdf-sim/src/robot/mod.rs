@@ -7,7 +7,9 @@
 mod bounds;
 mod description;
 mod include;
+mod mjcf;
 mod packages;
+mod solids;
 mod urdf;
 
 use std::path::{Path, PathBuf};
@@ -15,7 +17,7 @@ use std::path::{Path, PathBuf};
 pub use description::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, Unread, composed};
 pub use include::expand;
 pub use packages::Packages;
-pub use urdf::{mesh_reference, read_urdf};
+pub use urdf::mesh_reference;
 
 /// Formats of robot descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,10 +86,11 @@ impl Robot {
     /// It cannot be read, or links and joints are no tree.
     pub fn read(path: &Path, packages: &[(String, PathBuf)]) -> Result<Self, RobotError> {
         match RobotFormat::of_path(path)? {
-            Some(RobotFormat::Urdf) => read_urdf(path, &Packages::new(path, packages)),
-            Some(RobotFormat::Mjcf) => {
-                Err(RobotError::in_file(path, "robots of scenes are read from URDF so far; give a URDF file"))
+            Some(RobotFormat::Urdf) => urdf::read_urdf(path, &Packages::new(path, packages)),
+            Some(RobotFormat::Mjcf) if !packages.is_empty() => {
+                Err(RobotError::in_file(path, "packages are of URDF files; MJCF names files without them"))
             }
+            Some(RobotFormat::Mjcf) => mjcf::read_mjcf(path),
             None => Err(RobotError::in_file(path, "expected a robot description: .urdf, .xml or .mjcf")),
         }
     }

@@ -40,7 +40,8 @@ pub struct RobotSection {
     /// Motors of joints, by the joint's name in the file.
     #[serde(default)]
     pub motors: BTreeMap<String, RobotMotor>,
-    /// Coefficient of friction of all bodies [default: that of the file; URDF has none: 0].
+    /// Coefficient of friction of all bodies [default: of MJCF the greatest of the body's geoms; URDF
+    /// has none: 0].
     #[serde(default)]
     pub friction: Option<f64>,
     /// Whether links that are not neighbours have contacts with each other.
@@ -107,6 +108,9 @@ pub(super) fn expand(section: &RobotSection, robot: &Robot) -> Result<Expanded, 
         let found = robot.links.len();
         return Err(format!("it has {found} links; expected at most {MAX_LINKS}: divide the file"));
     }
+    if section.fixed && robot.links.first().is_some_and(Link::is_world) {
+        return Err("fixed: MJCF says itself what is fixed: all bodies without a joint; leave it out".into());
+    }
     let mut builder = Builder::new(section, robot)?;
     for link in 0..robot.links.len() {
         builder.place(link)?;
@@ -130,6 +134,8 @@ struct Builder<'a> {
     joints: Vec<JointSection>,
     /// Groups of links between which a joint is.
     neighbours: BTreeSet<[usize; 2]>,
+    /// Bodies that the file keeps apart, the lower one first.
+    apart: BTreeSet<[usize; 2]>,
 }
 
 impl<'a> Builder<'a> {
@@ -148,6 +154,7 @@ impl<'a> Builder<'a> {
             parts: Vec::new(),
             joints: Vec::new(),
             neighbours: BTreeSet::new(),
+            apart: BTreeSet::new(),
         })
     }
 
@@ -213,7 +220,9 @@ impl<'a> Builder<'a> {
         if joint.motion == Motion::Free {
             return Ok(Placed { pose: at_zero, body: None, is_fixed: false, group: k });
         }
-        self.neighbours.insert([parent.group, k]);
+        if !self.robot.links[joint.parent].is_world() {
+            self.neighbours.insert([parent.group, k]);
+        }
         let coordinate = self.coordinate(joint)?;
         let axis = joint.axis.normalize();
         let motion = match joint.motion {
@@ -328,7 +337,9 @@ impl<'a> Builder<'a> {
             |k: usize| self.places[k].body.map(|body| self.robot.links[self.links[body]].name.as_str());
         let pose = self.places[k].pose;
         let child = self.name(body(k).unwrap_or(&self.robot.links[k].name));
-        let parent = body(joint.parent).map(|name| self.name(name));
+        // Bodies that a joint connects have no contacts; with the world of MJCF they have.
+        let parent = Some(joint.parent).filter(|&parent| !self.robot.links[parent].is_world());
+        let parent = parent.and_then(body).map(|name| self.name(name));
         self.joints.push(JointSection {
             parent,
             anchor: Some(pose.to_world(joint.anchor).to_array()),
@@ -346,7 +357,10 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    fn finish(self) -> Result<Expanded, String> {
+    fn finish(mut self) -> Result<Expanded, String> {
+        let body = |link: usize| self.places[link].body;
+        let apart = self.robot.apart.iter().filter_map(|&[a, b]| Some([body(a)?, body(b)?]));
+        self.apart = apart.map(|[a, b]| [a.min(b), a.max(b)]).collect();
         let joints = || {
             let moves = |link: &'a Link| match &link.base {
                 Base::Joint(joint) if matches!(joint.motion, Motion::Hinge | Motion::Slider) => Some(joint),
@@ -378,7 +392,7 @@ impl<'a> Builder<'a> {
             let are_neighbours = p.group == q.group
                 || self.neighbours.contains(&[p.group, q.group])
                 || self.neighbours.contains(&[q.group, p.group]);
-            !self.section.self_contacts || are_neighbours || !meet
+            !self.section.self_contacts || are_neighbours || !meet || self.apart.contains(&[a, b])
         };
         let bodies = self.links.len();
         let pairs = (0..bodies).flat_map(move |a| (a + 1..bodies).map(move |b| [a, b]));

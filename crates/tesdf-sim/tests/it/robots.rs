@@ -244,3 +244,124 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_a_cure() {
     let told = LoadedScene::read(data().join("peg-arm.urdf")).expect_err("it was read").to_string();
     assert!(told.contains("a robot description; give it a scene: [[robots]]"), "{told}");
 }
+
+/// A free base with an arm: a class of defaults, an include, masses of geoms, and a mesh that is moved
+/// and turned.
+const MJCF: &str = r#"<mujoco model="m"><compiler angle="degree" meshdir="meshes"/>
+  <default><default class="arm"><joint damping="0.5" armature="0.01" range="-90 45"/><geom friction="0.7 0 0" density="500"/></default></default>
+  <include file="assets.xml"/>
+  <worldbody><geom name="table" type="box" size="1 1 0.1" pos="0 0 -0.1"/>
+    <body name="base" pos="0 0 1" euler="0 0 90"><freejoint name="root"/><inertial mass="2" pos="0 0 0.1" quat="1 0 0 1" diaginertia="0.01 0.02 0.025"/>
+      <geom type="box" size="0.1 0.1 0.1"/>
+      <body name="arm" pos="0.3 0 0" childclass="arm"><joint name="elbow" axis="0 1 0" pos="0 0 0.05"/>
+        <geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.02"/><geom type="cylinder" size="0.03 0.05" pos="0.2 0 0" mass="0.4"/>
+        <body pos="0.25 0 0"><joint type="slide" axis="1 0 0" range="-0.1 0.1"/><geom type="mesh" mesh="tip"/></body>
+      </body>
+    </body>
+    <body name="ball" pos="0 2 0"><joint name="socket" type="ball"/><geom type="sphere" size="0.1" contype="2" conaffinity="2"/></body>
+  </worldbody>
+  <contact><exclude body1="base" body2="ball"/></contact>
+</mujoco>"#;
+
+fn mjcf(text: &str, keys: &str) -> Result<LoadedScene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("meshes")).unwrap();
+    let tip = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    std::fs::write(folder.path().join("meshes/tip.obj"), tip).unwrap();
+    let assets = "<mujocoinclude><asset><mesh name='tip' file='tip.obj' scale='0.1 0.1 0.1' refpos='1 0 0' \
+                  refquat='1 0 0 1'/></asset></mujocoinclude>";
+    std::fs::write(folder.path().join("assets.xml"), assets).unwrap();
+    std::fs::write(folder.path().join("robot.xml"), text).unwrap();
+    let text =
+        format!("time_step = 1e-3\nduration = 0.1\nbodies = []\n[[robots]]\nfile = 'robot.xml'\n{keys}");
+    let loaded = LoadedScene::parse(text, folder.path().join("scene.toml"))?;
+    // The meshes are there only now.
+    loaded.system()?;
+    Ok(loaded)
+}
+
+#[test]
+fn an_mjcf_file_gives_bodies_joints_and_masses_of_geoms() {
+    let loaded = mjcf(MJCF, "coordinates = { elbow = 0.5 }").unwrap();
+    let section =
+        |name: &str| loaded.scene.bodies.iter().map(|b| b.get_ref()).find(|b| b.name == name).unwrap();
+    let names: Vec<_> = loaded.scene.bodies.iter().map(|b| b.get_ref().name.as_str()).collect();
+    assert_eq!(names, ["world", "base", "arm", "body3", "ball"]);
+    assert!(section("world").fixed && section("world").parts.len() == 1);
+    let base = section("base");
+    assert_eq!((base.mass, base.friction, base.fixed), (Some(2.0), 1.0, false));
+    let [xx, yy, zz, ..] = base.inertia.unwrap();
+    assert!((xx - 0.02).abs() < 1e-15 && (yy - 0.01).abs() < 1e-15 && (zz - 0.025).abs() < 1e-15);
+    // A capsule of 500 kg/m³ and a cylinder of 0.4 kg.
+    let arm = section("arm");
+    let capsule = 500.0 * std::f64::consts::PI * (4e-4 * 0.2 + 4.0 / 3.0 * 8e-6);
+    assert!((arm.mass.unwrap() - capsule - 0.4).abs() < 1e-12 && arm.friction == 0.7);
+    let center = (capsule * 0.1 + 0.4 * 0.2) / (capsule + 0.4);
+    assert!((arm.center_of_mass.unwrap()[0] - center).abs() < 1e-12);
+    // The base is turned by 90° about z, so x of the arm is y of the world.
+    let origin = DAffine3::from_translation(DVec3::Z)
+        * about(DVec3::Z, 90.0_f64.to_radians())
+        * DAffine3::from_translation(DVec3::new(0.3, 0.0, 0.05))
+        * about(DVec3::Y, 0.5)
+        * DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.05));
+    assert!(
+        DVec3::from_array(arm.translation).abs_diff_eq(origin.translation, 1e-12),
+        "{:?}",
+        arm.translation
+    );
+    let joint = |name: &str| loaded.scene.joints.iter().find(|joint| joint.name == name).unwrap();
+    let elbow = joint("elbow");
+    assert_eq!((elbow.resistance.damping, elbow.resistance.armature, elbow.coordinate), (0.5, 0.01, 0.5));
+    let [low, high] = elbow.limits.unwrap().map(f64::to_degrees);
+    assert!((low + 90.0).abs() < 1e-12 && (high - 45.0).abs() < 1e-12);
+    assert_eq!(joint("body3").limits, Some([-0.1, 0.1]));
+    assert_eq!(joint("socket").parent, None);
+    // The tip: less (1, 0, 0), turned back by 90° about z, a tenth: its corner at (1, 0, 0) is at the
+    // origin, that at (0, 0, 0) at (0, 0.1, 0).
+    let part = &section("body3").parts[0];
+    let turn = tesdf::glam::DQuat::from_array(part.rotation);
+    let at = |p: DVec3| turn * (DVec3::from_array(part.scale) * p) + DVec3::from_array(part.translation);
+    assert!(
+        at(DVec3::X).abs_diff_eq(DVec3::ZERO, 1e-15) && at(DVec3::ZERO).abs_diff_eq(DVec3::Y * 0.1, 1e-15)
+    );
+    // 1/6 of a unit cube, 1000 kg/m³ but for the class: 500.
+    assert!((section("body3").mass.unwrap() - 500.0 * 1e-3 / 6.0).abs() < 1e-12);
+    let excluded = |a: &str, b: &str| loaded.scene.exclude.iter().any(|pair| pair.bodies == [a, b]);
+    // Neighbours; what <exclude> and the groups say; and the table meets the base.
+    assert!(excluded("base", "arm") && excluded("base", "ball") && excluded("arm", "ball"));
+    assert!(!excluded("world", "base") && !excluded("base", "body3"));
+}
+
+#[test]
+fn what_mjcf_has_and_a_scene_has_not_is_refused() {
+    for (from, to, expected) in [
+        ("<contact>", "<actuator><motor joint='elbow'/></actuator><contact>", "ignore = [\"actuator\"]"),
+        ("<contact>", "<equality><weld body1='base'/></equality><contact>", "ignore = [\"equality\"]"),
+        ("<freejoint", "<replicate count='3'/><freejoint", "ignore = [\"replicate\"]"),
+        ("<freejoint name=\"root\"/>", "<frame><freejoint/></frame>", "<freejoint> is within <frame>"),
+        ("axis=\"0 1 0\"", "axis=\"0 1 0\" stiffness=\"3\"", "body arm: the joint elbow has a spring"),
+        ("axis=\"0 1 0\"", "axis=\"0 1 0\" ref=\"3\"", "the joint elbow has ref"),
+        ("axis=\"0 1 0\"", "axis=\"0 0 0\"", "the axis of the joint elbow"),
+        (
+            "<joint name=\"elbow\"",
+            "<joint name='other'/><joint name=\"elbow\"",
+            "body arm: it has 2 joints; expected one",
+        ),
+        ("type=\"box\" size=\"0.1", "type=\"ellipsoid\" size=\"0.1", "is of type ellipsoid"),
+        ("type=\"box\" size=\"1 1 0.1\"", "type=\"plane\" size=\"1 1 0.1\"", "geom table is of type plane"),
+        ("mesh=\"tip\"", "mesh=\"top\"", "the mesh 'top' is not in <asset>"),
+        ("body2=\"ball\"", "body2=\"bull\"", "<exclude> names the body bull"),
+    ] {
+        let told = mjcf(&MJCF.replacen(from, to, 1), "").expect_err("it was accepted").to_string();
+        assert!(told.contains(expected), "{told}\nexpected {expected}");
+    }
+    assert!(
+        mjcf(
+            &MJCF.replacen("<contact>", "<actuator><motor joint='elbow'/></actuator><contact>", 1),
+            "ignore = ['actuator']"
+        )
+        .is_ok()
+    );
+    let told = mjcf(MJCF, "fixed = true").expect_err("it was accepted").to_string();
+    assert!(told.contains("MJCF says itself"), "{told}");
+}
