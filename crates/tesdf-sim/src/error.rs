@@ -36,6 +36,19 @@ pub enum DynamicsError {
         /// What the system has.
         what: &'static str,
     },
+    /// A snapshot is of another engine.
+    #[error("the snapshot is of another simulation; expected one of this simulation or of a copy of it")]
+    OtherEngine,
+    /// A body that is not free has no mass.
+    #[error("body {body} ({name}) is {kind} and has no mass; only a free body has")]
+    NoMass {
+        /// Number of the body.
+        body: usize,
+        /// Its name.
+        name: String,
+        /// `fixed` or `kinematic`.
+        kind: &'static str,
+    },
     /// The number of states differs from the number of bodies.
     #[error("{found} states for {expected} bodies")]
     States {

@@ -18,6 +18,7 @@
 //! - [`robot`]: robot descriptions in URDF and MJCF.
 //! - [`criterion`]: what makes a run a success; other crates can add criteria.
 //! - [`Run`]: a run that is made step by step.
+//! - [`Worlds`]: many worlds of one scene, stepped on all threads, for control and learning.
 //! - [`record`]: run files.
 //!
 //! Units are SI: metres, kilograms, seconds, radians. Everything is deterministic: on one kind of
@@ -39,6 +40,7 @@ mod simulate;
 mod system;
 mod totals;
 mod warning;
+mod worlds;
 
 pub use dynamics::{Dynamics, Residual, StepReport};
 pub use error::DynamicsError;
@@ -49,3 +51,4 @@ pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};
 pub use simulate::{Moment, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};
 pub use system::{Body, Mass, State, System, Wrench};
 pub use warning::{Warning, WarningKind};
+pub use worlds::{World, WorldError, WorldSnapshot, Worlds};

@@ -279,6 +279,25 @@ impl System {
         [joint.parent.map_or(Pose::IDENTITY, |parent| states[parent].pose), states[joint.child].pose]
     }
 
+    /// Sets the mass properties of a free body. Its points keep their velocities.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::NoMass`] when the body is fixed or kinematic.
+    pub fn set_mass(&mut self, body: usize, mass: MassProperties) -> Result<(), DynamicsError> {
+        let Body { name, mass: before, .. } = self.body(body)?;
+        let center = match before {
+            Mass::Free(before) => before.center,
+            Mass::Fixed => return Err(DynamicsError::NoMass { body, name: name.clone(), kind: "fixed" }),
+            Mass::Kinematic => {
+                return Err(DynamicsError::NoMass { body, name: name.clone(), kind: "kinematic" });
+            }
+        };
+        let state = &mut self.states[body];
+        state.linear += state.angular.cross(state.pose.rotation * (mass.center - center));
+        self.bodies[body].mass = Mass::Free(mass);
+        Ok(())
+    }
+
     /// Sets the coefficient of friction of a body.
     ///
     /// # Errors
@@ -446,6 +465,25 @@ impl System {
     /// from the number of bodies.
     pub fn set_states(&mut self, states: Vec<State>) -> Result<(), DynamicsError> {
         self.replace_states(states, self.coordinates.clone())
+    }
+
+    /// Begins again with these states: coordinates of joints are counted anew, and wrenches are zero.
+    /// Rotations of unit length stay bit for bit, up to rounding. On an error nothing changes.
+    ///
+    /// # Errors
+    /// As [`set_states`](Self::set_states), and [`DynamicsError::Collide`] when a rotation is not of
+    /// unit length.
+    pub fn reset(&mut self, mut states: Vec<State>) -> Result<(), DynamicsError> {
+        for (body, state) in states.iter_mut().enumerate().take(self.bodies.len()) {
+            self.check(body, state)?;
+            if (state.pose.rotation.length() - 1.0).abs() > 4.0 * f64::EPSILON {
+                state.pose = Pose::new(state.pose.translation, state.pose.rotation)?;
+            }
+        }
+        // Of the turns of hinges, none counts.
+        self.replace_states(states, vec![0.0; self.joints.len()])?;
+        self.wrenches.fill(Wrench::default());
+        Ok(())
     }
 
     fn check(&self, body: usize, state: &State) -> Result<(), DynamicsError> {

@@ -1,3 +1,4 @@
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -21,7 +22,7 @@ use super::velocities::Solved;
 use super::{Detect, Newton, NewtonOptions};
 use crate::dynamics::Verdict;
 use crate::forces::Forces;
-use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
+use crate::{Dynamics, DynamicsError, Mass, MassProperties, Motor, State, StepReport, System, Wrench};
 
 /// Maximum number of further detections in a step when bodies close faster than was foreseen.
 const MORE_LOOKS: u32 = 8;
@@ -79,8 +80,8 @@ impl Newton {
         collide.validate()?;
         let diagonals = system.bodies().iter().map(|body| system.diagonal(body));
         let sizes = diagonals.collect::<Result<_, CollideError>>()?;
-        let (detector, found) = (Box::new(detector), Contacts::default());
-        let surfaces = Surfaces::new(system.scene(), collide.mode);
+        let (detector, found) = (Arc::new(detector), Contacts::default());
+        let surfaces = Arc::new(Surfaces::new(system.scene(), collide.mode));
         let forces = Forces::none(system.joints().len());
         let (sleep, kept) = (Sleep::new(system.states()), Kept::default());
         Ok(Self { system, detector, collide, options, sizes, surfaces, found, forces, sleep, kept })
@@ -96,6 +97,27 @@ impl Newton {
         }
         self.system.gravity = gravity;
         self.wake_all();
+        Ok(())
+    }
+
+    /// Sets the mass properties of a free body from now on. It wakes. Its points keep their velocities.
+    ///
+    /// # Errors
+    /// As [`System::set_mass`].
+    pub fn set_mass(&mut self, body: usize, mass: MassProperties) -> Result<(), DynamicsError> {
+        self.system.set_mass(body, mass)?;
+        self.wake(body);
+        Ok(())
+    }
+
+    /// Sets the coefficient of friction of a body from now on, as [`System::friction`] uses it. It wakes,
+    /// with the bodies that it touches.
+    ///
+    /// # Errors
+    /// As [`System::set_friction`].
+    pub fn set_friction(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
+        self.system.set_friction(body, coefficient)?;
+        self.wake(body);
         Ok(())
     }
 

@@ -9,7 +9,7 @@ use super::rows::{Row, RowForce, RowId, carry};
 pub const FORGETS: u64 = 16;
 
 /// The forces of the last step.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Kept {
     ids: Vec<RowId>,
     forces: Vec<RowForce>,

@@ -24,6 +24,8 @@
 //! With re-detection, the gaps and rows come from the predicted pose. The step is then an iteration
 //! of sequential quadratic programming on the exact distance.
 
+use std::sync::Arc;
+
 use tesdf::collide::{CollideError, CollideOptions, Contacts, Mode, Scene};
 
 use crate::System;
@@ -58,11 +60,13 @@ mod rotation;
 mod rows;
 mod runs;
 mod sleep;
+mod snapshot;
 mod solve;
 mod step;
 mod velocities;
 
 pub use options::NewtonOptions;
+pub use snapshot::Snapshot;
 
 use deep::Surfaces;
 use kept::Kept;
@@ -95,16 +99,18 @@ where
     }
 }
 
-/// The built-in engine: Newton's method on a regularised convex problem of all contacts.
+/// The built-in engine: Newton's method on a regularised convex problem of all contacts. A clone shares
+/// meshes and detector, and makes the same steps.
+#[derive(Clone)]
 pub struct Newton {
     system: System,
-    detector: Box<dyn Detect>,
+    detector: Arc<dyn Detect>,
     collide: CollideOptions,
     options: NewtonOptions,
     /// Diagonal of each body's bounding box, m.
     sizes: Vec<f64>,
     /// For bodies that overlap deeply.
-    surfaces: Surfaces,
+    surfaces: Arc<Surfaces>,
     /// What the last step found at its beginning.
     found: Contacts,
     /// Of the last step.

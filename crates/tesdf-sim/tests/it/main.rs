@@ -24,3 +24,4 @@ mod separation;
 mod sleep;
 mod support;
 mod warnings;
+mod worlds;

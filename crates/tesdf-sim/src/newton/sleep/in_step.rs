@@ -227,6 +227,11 @@ impl Newton {
         Ok(())
     }
 
+    /// Wakes a body, and those that it touches.
+    pub(in crate::newton) fn wake(&mut self, body: usize) {
+        self.sleep.disturb(body, &self.system);
+    }
+
     /// Wakes all bodies.
     pub(in crate::newton) fn wake_all(&mut self) {
         self.sleep.rests.iter_mut().for_each(|rest| rest.time = 0.0);

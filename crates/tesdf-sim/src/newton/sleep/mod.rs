@@ -35,7 +35,7 @@ const STAYS: f64 = 1e-9;
 const STAYS_OF_SIZE: f64 = 1e-6;
 
 /// What is known of bodies at rest, of each body by its number.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Sleep {
     rests: Vec<Rest>,
     /// Whether a pose was set since the last step.
@@ -58,7 +58,7 @@ struct Rest {
 }
 
 /// What was found between two bodies that are still.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Kept {
     bodies: [usize; 2],
     contacts: Vec<Contact>,
