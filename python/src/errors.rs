@@ -18,7 +18,7 @@ use tesdf::verify::VerifyError;
 use tesdf_playback::PlaybackError;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::SceneError;
-use tesdf_sim::{DynamicsError, SimulateError};
+use tesdf_sim::{DynamicsError, MassError, SimulateError};
 
 use crate::classes::{self, Checked};
 
@@ -43,6 +43,12 @@ pub enum Error {
     Scene(SceneError),
     Simulate(SimulateError),
     Dynamics(DynamicsError),
+    /// The world that refused a value or a step.
+    World(usize, Box<Error>),
+    /// Mass properties of a body, by its name, that cannot be.
+    Mass(String, MassError),
+    /// A simulation without a history was asked for it.
+    NoHistory,
     /// The run file that cannot be read or written.
     Record(PathBuf, RecordError),
     Playback(PlaybackError),
@@ -76,9 +82,13 @@ impl Error {
             Self::Scene(SceneError::Read { ref source, .. })
             | Self::Record(_, RecordError::Read { ref source, .. }) => system(source, self.text()),
             Self::Scene(_) | Self::NoBody(..) => new(py, "SceneError", self.text()),
-            Self::Simulate(_) | Self::Dynamics(_) | Self::Record(..) | Self::Playback(_) => {
-                new(py, "SimulationError", self.text())
-            }
+            Self::Simulate(_)
+            | Self::Dynamics(_)
+            | Self::World(..)
+            | Self::Mass(..)
+            | Self::NoHistory
+            | Self::Record(..)
+            | Self::Playback(_) => new(py, "SimulationError", self.text()),
             Self::Domain(DomainError::Read {
                 source: ReadTetrahedraError::Open { ref source, .. }, ..
             }) => system(source, self.text()),
@@ -128,6 +138,11 @@ impl Error {
             Self::Scene(e) => e.to_string(),
             Self::Simulate(e) => e.to_string(),
             Self::Dynamics(e) => e.to_string(),
+            Self::World(world, e) => format!("world {world}: {}", e.text()),
+            Self::Mass(body, e) => format!("body {body}: {e}"),
+            Self::NoHistory => {
+                "the simulation keeps no history; make it with history=True, the default".into()
+            }
             Self::Record(_, e @ (RecordError::Save(_) | RecordError::Read { .. })) => e.to_string(),
             Self::Record(path, e) => format!("{}: {e}", path.display()),
             Self::Playback(e) => e.to_string(),

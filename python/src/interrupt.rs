@@ -7,7 +7,7 @@ use std::time::Duration;
 use pyo3::prelude::*;
 
 /// Time between two checks for Python's signals.
-const POLL: Duration = Duration::from_millis(50);
+pub const POLL: Duration = Duration::from_millis(50);
 
 /// Runs `work` on a separate thread without the interpreter's lock. Meanwhile this thread lets
 /// Python handle signals and calls `watch`. When either raises, it calls `cancel`, waits for

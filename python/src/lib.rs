@@ -18,6 +18,7 @@ mod interrupt;
 mod kept_pairs;
 mod mesh;
 mod mujoco;
+mod opening;
 mod pairs;
 mod patches;
 mod playback;
@@ -25,9 +26,11 @@ mod polygons;
 mod pool;
 mod poses;
 mod scene;
+mod settings;
 mod shapes;
 mod simulation;
 mod why_report;
+mod worlds;
 
 /// The compiled part of the package `tesdf`.
 #[pyo3::pymodule]
@@ -51,11 +54,15 @@ mod _native {
     #[pymodule_export]
     use super::polygons::polygons;
     #[pymodule_export]
+    use super::poses::pose;
+    #[pymodule_export]
     use super::scene::Scene;
     #[pymodule_export]
     use super::scene::pair;
     #[pymodule_export]
-    use super::simulation::Simulation;
+    use super::simulation::{Simulation, Snapshot};
+    #[pymodule_export]
+    use super::worlds::Worlds;
 
     /// The face in the answer of a point that is not finite, and of a ray that meets no face.
     #[pymodule_export]

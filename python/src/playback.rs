@@ -169,7 +169,7 @@ fn write(
         pool.install(|| {
             let source = match (simulation, file) {
                 (Some(simulation), _) => {
-                    let (record, system) = simulation.so_far();
+                    let (record, system) = simulation.so_far()?;
                     Source::of_simulation(record, system)?
                 }
                 (None, file) => Source::open(&file.unwrap_or_default(), &geometries, &progress)?,

@@ -46,6 +46,12 @@ pub fn poses(name: &str, any: &Bound<'_, PyAny>, count: Count) -> PyResult<Vec<P
     found.into_iter().enumerate().map(named).collect()
 }
 
+/// The seven numbers of a pose, x y z qx qy qz qw, of these or of a matrix [4, 4]. Errors name it.
+#[pyfunction]
+pub fn pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<[f64; 7]> {
+    Ok(of_pose(&poses(name, pose, Count::One)?[0]))
+}
+
 /// Converts velocities: linear, then angular in radians, vx vy vz wx wy wz. The scene checks that
 /// they are finite.
 ///
@@ -136,6 +142,45 @@ pub fn numbers(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<
     }
 }
 
+/// Converts a pose for each of some rows, or one for all.
+///
+/// # Errors
+/// As [`poses`].
+pub fn poses_of(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<Pose>> {
+    let shape = floats(any)?.shape().to_vec();
+    match *shape {
+        [7] | [4, 4] => Ok(vec![poses(name, any, Count::One)?[0]; rows]),
+        [n, 7] | [n, 4, 4] if n == rows => poses(name, any, Count::Rows),
+        _ => {
+            let expected =
+                format!("shape (7,), x y z qx qy qz qw, or (4, 4), or ({rows}, …) with a row for each world");
+            Err(shape_error(name, &floats(any)?, &expected))
+        }
+    }
+}
+
+/// Converts N numbers for each of some rows, or N for all.
+///
+/// # Errors
+/// `ValueError` names the argument and the shape.
+pub fn columns<const N: usize>(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<[f64; N]>> {
+    let array = floats(any)?;
+    let numbers = array.as_slice()?.as_chunks::<N>().0;
+    let (one, each): (&[usize], Vec<usize>) = if N == 1 { (&[], vec![rows]) } else { (&[N], vec![rows, N]) };
+    match array.shape() {
+        shape if shape == one => Ok(vec![numbers[0]; rows]),
+        shape if shape == each => Ok(numbers.to_vec()),
+        _ => {
+            let of_each = if N == 1 {
+                format!("a number, or shape ({rows},)")
+            } else {
+                format!("shape ({N},) or ({rows}, {N})")
+            };
+            Err(shape_error(name, &array, &format!("{of_each} with a row for each world")))
+        }
+    }
+}
+
 /// Converts numbers of 32 bits, of which one stands for all rows.
 ///
 /// # Errors
@@ -163,7 +208,7 @@ pub fn of_velocity(velocity: &Velocity) -> [f64; 6] {
 }
 
 /// Any object that numpy can convert to `float64`.
-fn floats<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+pub fn floats<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     let py = any.py();
     static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let require = REQUIRE.import(py, "numpy", "require")?;
@@ -172,7 +217,7 @@ fn floats<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>
     Ok(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?)
 }
 
-fn shape_error(name: &str, array: &PyReadonlyArrayDyn<'_, f64>, expected: &str) -> PyErr {
+pub fn shape_error(name: &str, array: &PyReadonlyArrayDyn<'_, f64>, expected: &str) -> PyErr {
     match array.getattr("shape") {
         Ok(shape) => argument(name, format!("an array of shape {shape}"), expected),
         Err(e) => e,

@@ -24,7 +24,8 @@ use crate::{classes, pool, shapes};
 
 /// Shapes, and instances of them with poses; detect finds the contacts.
 ///
-/// - A shape is an Asset, Plane, Box, Sphere or Capsule. All its instances share it.
+/// - A shape is an Asset, Plane, Box, Sphere or Capsule, or a mesh in memory, (vertices, faces) or an
+///   object that has both, which is encoded with the preset "fast". All its instances share it.
 /// - A pose maps the shape's frame to the world's frame: first rotate, then translate. It has seven
 ///   numbers, x y z qx qy qz qw: the translation and a unit quaternion, whose real part qw comes
 ///   last, as in scene files and on the command line. Or it is a matrix [4, 4] that maps columns,

@@ -1,7 +1,7 @@
 //! Shapes of scenes: assets, and the classes of `tesdf.shapes`.
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyType;
+use pyo3::types::{PyTuple, PyType};
 use tesdf::collide::Shape;
 use tesdf::glam::DVec3;
 
@@ -28,10 +28,11 @@ fn classes(py: Python<'_>) -> PyResult<Classes<'_, '_>> {
     })
 }
 
-/// Converts an asset, or an object of `tesdf.shapes`. The library checks its sizes.
+/// Converts an asset, an object of `tesdf.shapes`, or a mesh in memory, which is encoded. The library
+/// checks sizes.
 ///
 /// # Errors
-/// `ValueError` names the argument and what was found.
+/// `ValueError` names the argument and what was found; those of `tesdf.encode`.
 pub fn shape(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
     if let Ok(asset) = any.cast::<Asset>() {
         return Ok(asset.get().shared().into());
@@ -54,8 +55,20 @@ pub fn shape(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
     } else if any.is_instance(classes.capsule)? {
         Ok(Shape::Capsule { half_height: size("half_height")?, radius: size("radius")? })
     } else {
-        Err(argument(name, kind_of(any), "an Asset, Plane, Box, Sphere or Capsule"))
+        encoded(name, any)
     }
+}
+
+/// The asset of a pair (vertices, faces), or of an object that has both.
+fn encoded(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
+    let is_mesh = any.hasattr("vertices")? && any.hasattr("faces")?;
+    if !is_mesh && any.cast::<PyTuple>().map_or(true, |pair| pair.len() != 2) {
+        let expected = "an Asset, Plane, Box, Sphere or Capsule, or a mesh: (vertices, faces), or an object that has \
+                        both";
+        return Err(argument(name, kind_of(any), expected));
+    }
+    let asset = any.py().import("tesdf._native")?.call_method1("encode", (any, "fast"))?;
+    Ok(asset.cast::<Asset>()?.get().shared().into())
 }
 
 /// The Python object of a shape. An asset is shared, not copied.

@@ -1,30 +1,28 @@
 //! `tesdf.Simulation`
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use tesdf::Progress;
 use tesdf::collide::Velocity;
 use tesdf::glam::DVec3;
-use tesdf_playback::{LiveView, PlaybackError};
+use tesdf_playback::{LiveFrame, LiveView, PlaybackError};
 use tesdf_sim::newton::Newton;
-use tesdf_sim::scene_file::{AssetCache, DetectorMode, LoadedScene, SceneError};
-use tesdf_sim::{
-    Drive, Dynamics, DynamicsError, Motor, PartialRun, Run, RunRecord, SimulateError, State, System, Wrench,
-};
+use tesdf_sim::scene_file::SceneFile;
+use tesdf_sim::{Dynamics, PartialRun, Run, RunRecord, State, System, World, WorldSnapshot, Wrench};
 
 use crate::contacts::{self, Columns};
 use crate::detection::named;
-use crate::device::{self, Device};
-use crate::errors::{Error, argument, kind_of};
-use crate::interrupt::cancellable;
+use crate::device;
+use crate::errors::{Error, argument};
+use crate::interrupt::{POLL, cancellable};
+use crate::opening::{Opened, Replaced, Source};
 use crate::poses::{Count, of_pose, of_velocity, poses, velocities};
+use crate::settings::{self, index_of};
 use crate::{classes, forces, pool};
 
 /// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and
@@ -36,6 +34,8 @@ use crate::{classes, forces, pool};
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
 /// - device: where contacts are found, as in Scene.detect.
+/// - history: whether states, warnings and the summary are kept, which takes memory in each step.
+///   Control loops that neither save nor view their steps go without.
 ///
 /// Units are SI: metres, kilograms, seconds, radians. Bodies have the numbers of their order in the
 /// scene, from 0. Meshes of the scene are encoded first, which Ctrl-C ends with KeyboardInterrupt.
@@ -48,62 +48,101 @@ pub struct Simulation {
 }
 
 struct Running {
-    engine: Newton,
-    run: Run,
+    world: World,
+    /// With a history.
+    run: Option<Run>,
+    scene: Arc<SceneOfRun>,
     /// The page that follows the steps.
     view: Option<LiveView>,
 }
 
-/// Where a scene comes from.
-enum Source {
-    File(PathBuf),
-    Json(serde_json::Value),
+/// What a run begins with.
+struct SceneOfRun {
+    scene: SceneFile,
+    folder: String,
+    planned: u64,
 }
 
-impl Source {
-    fn new(any: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if let Ok(path) = any.extract() {
-            return Ok(Self::File(path));
-        }
-        let expected = "a path, or a dict with the keys of a scene file";
-        let Ok(dict) = any.cast::<PyDict>() else {
-            return Err(PyTypeError::new_err(format!("scene: {}; expected {expected}", kind_of(any))));
-        };
-        let text: String = dict.py().import("tesdf.scenes")?.getattr("to_json")?.call1((dict,))?.extract()?;
-        let json = serde_json::from_str(&text).map_err(|e| argument("scene", e, "finite numbers"))?;
-        Ok(Self::Json(json))
-    }
-
-    fn read(self) -> Result<LoadedScene, SceneError> {
-        match self {
-            Self::File(path) => LoadedScene::read(path),
-            Self::Json(json) => LoadedScene::of_json(json, "<scene>"),
-        }
+impl SceneOfRun {
+    /// A run that begins with the states of `system`.
+    fn run(&self, system: &System) -> Result<Run, Error> {
+        let run = PartialRun::new(&self.scene, system, self.folder.clone());
+        Run::new(&self.scene, system, run).map_err(Error::Simulate)
     }
 }
 
 impl Running {
-    /// Reads the scene, encodes its meshes, and begins the run.
-    fn begin(mut loaded: LoadedScene, device: Option<Device>, progress: &Progress) -> Result<Self, Error> {
-        let scene_error = Error::Scene;
-        loaded.assets = AssetCache::of_user();
-        let system = loaded.system_watched(progress).map_err(scene_error)?;
-        // The run stores the scene's folder, so its meshes are found from any folder.
-        loaded.path = std::path::absolute(&loaded.path)
-            .map_err(|source| scene_error(SceneError::Read { path: loaded.path.clone(), source }))?;
-        let folder = loaded.path.parent().unwrap_or(&loaded.path).to_string_lossy().into_owned();
-        let run = PartialRun::new(&loaded.scene, &system, folder);
-        let engine = match device {
-            Some(device) => loaded.newton_with(system, device.into_detector()),
-            None => loaded.newton(system),
-        };
-        let engine = engine.map_err(scene_error)?;
-        let run = Run::new(&loaded.scene, engine.system(), run).map_err(Error::Simulate)?;
-        Ok(Self { engine, run, view: None })
+    fn begin(opened: Opened, history: bool) -> Result<Self, Error> {
+        let Opened { scene, folder, engine } = opened;
+        let planned = scene.steps().map_err(|e| Error::Simulate(e.into()))?;
+        let scene = Arc::new(SceneOfRun { scene, folder, planned });
+        let run = history.then(|| scene.run(engine.system())).transpose()?;
+        let world = World::new(&scene.scene, engine).map_err(Error::Simulate)?;
+        Ok(Self { world, run, scene, view: None })
+    }
+
+    fn system(&self) -> &System {
+        self.world.engine().system()
     }
 
     fn states(&self) -> &[State] {
-        self.engine.system().states()
+        self.system().states()
+    }
+
+    fn step(&mut self) -> Result<(), Error> {
+        match &mut self.run {
+            Some(run) => self.world.step_of(run).map(|_| ()),
+            None => self.world.step().map(|_| ()),
+        }
+        .map_err(Error::Simulate)?;
+        let (world, engine) = (&self.world, self.world.engine());
+        let (system, forces) = (engine.system(), engine.forces());
+        if let Some(view) = &mut self.view
+            && view.show(&LiveFrame { step: world.steps(), time: world.time(), system, forces }).is_err()
+        {
+            // A state that no page can draw ends the page, not the run.
+            self.view = None;
+        }
+        Ok(())
+    }
+
+    fn history(&self) -> Result<&Run, Error> {
+        self.run.as_ref().ok_or(Error::NoHistory)
+    }
+
+    fn record(&self) -> Result<RunRecord, Error> {
+        Ok(self.history()?.clone().into_record(self.system()))
+    }
+
+    fn copy(&self) -> Self {
+        Self { world: self.world.clone(), run: self.run.clone(), scene: Arc::clone(&self.scene), view: None }
+    }
+}
+
+/// A moment of a Simulation, or of Worlds, to go back to with restore. It cannot be stored in a file.
+#[pyclass(frozen, module = "tesdf")]
+pub struct Snapshot {
+    /// One for each world.
+    pub worlds: Vec<WorldSnapshot>,
+    /// Of a simulation with a history.
+    run: Option<Run>,
+}
+
+impl Snapshot {
+    pub fn of_worlds(worlds: Vec<WorldSnapshot>) -> Self {
+        Self { worlds, run: None }
+    }
+}
+
+#[pymethods]
+impl Snapshot {
+    /// Number of worlds.
+    fn __len__(&self) -> usize {
+        self.worlds.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<tesdf.Snapshot: {} worlds>", self.worlds.len())
     }
 }
 
@@ -117,12 +156,20 @@ impl Simulation {
         py.detach(|| read(&self.locked()))
     }
 
+    /// Reads what may be missing.
+    fn try_read<T: Send>(
+        &self,
+        py: Python<'_>,
+        read: impl FnOnce(&Running) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        self.read(py, read).map_err(|e| e.raise(py))
+    }
+
     /// The run so far, and its bodies. Waits for a step of another thread, so the caller must not
     /// hold the interpreter's lock.
-    pub fn so_far(&self) -> (RunRecord, System) {
+    pub fn so_far(&self) -> Result<(RunRecord, System), Error> {
         let running = self.locked();
-        let system = running.engine.system();
-        (running.run.clone().into_record(system), system.clone())
+        Ok((running.record()?, running.system().clone()))
     }
 
     fn pool(&self, py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
@@ -132,14 +179,18 @@ impl Simulation {
         }
     }
 
-    /// Changes the engine between two steps.
+    /// Changes something between two steps.
     fn change(
         &self,
         py: Python<'_>,
-        change: impl FnOnce(&mut Newton) -> Result<(), DynamicsError> + Send,
+        change: impl FnOnce(&mut Running) -> Result<(), Error> + Send,
     ) -> PyResult<()> {
-        let changed = py.detach(|| change(&mut self.locked().engine));
-        changed.map_err(|e| Error::Dynamics(e).raise(py))
+        py.detach(|| change(&mut self.locked())).map_err(|e| e.raise(py))
+    }
+
+    /// Changes the engine between two steps.
+    fn set(&self, py: Python<'_>, set: impl FnOnce(&mut Newton) -> Result<(), Error> + Send) -> PyResult<()> {
+        self.change(py, |r| set(r.world.engine_mut()))
     }
 
     /// Makes this number of steps, or all that the duration leaves. Ctrl-C ends it between two
@@ -151,59 +202,39 @@ impl Simulation {
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let pool = self.pool(py)?;
-        let stop = AtomicBool::new(false);
-        let (done, planned) = self.read(py, |r| (r.run.record().steps(), r.run.planned_steps()));
-        let done = AtomicU64::new(done);
-        let work = || {
-            pool.install(|| -> Result<(), SimulateError> {
-                let Running { engine, run, view } = &mut *self.locked();
-                let count = count.unwrap_or(planned.saturating_sub(run.record().steps()));
-                for _ in 0..count {
-                    if stop.load(Ordering::Relaxed) {
+        let (mut done, planned) = self.read(py, |r| (r.world.steps(), r.scene.planned));
+        let mut left = count.unwrap_or(planned.saturating_sub(done));
+        loop {
+            // On a thread that is there already, for as long as a signal may wait.
+            let slice = || -> Result<(u64, u64), Error> {
+                let (running, begin) = (&mut *self.locked(), Instant::now());
+                let mut left = left;
+                while left > 0 {
+                    running.step()?;
+                    left -= 1;
+                    if begin.elapsed() >= POLL {
                         break;
                     }
-                    let moment = run.step(engine)?;
-                    done.store(moment.step, Ordering::Relaxed);
-                    if let Some(live) = view
-                        && live.show(&moment).is_err()
-                    {
-                        // A state that no page can draw ends the page, not the run.
-                        *view = None;
-                    }
                 }
-                Ok(())
-            })
-        };
-        let watch = || match progress {
-            Some(progress) => progress.call1((done.load(Ordering::Relaxed), planned)).map(|_| ()),
-            None => Ok(()),
-        };
-        let made = cancellable(py, work, || stop.store(true, Ordering::Relaxed), watch)?;
-        made.map_err(|e| Error::Simulate(e).raise(py))?;
-        watch()
+                Ok((running.world.steps(), left))
+            };
+            (done, left) = py.detach(|| pool.install(slice)).map_err(|e| e.raise(py))?;
+            if let Some(progress) = progress {
+                progress.call1((done, planned))?;
+            }
+            py.check_signals()?;
+            if left == 0 {
+                return Ok(());
+            }
+        }
     }
-}
-
-/// The number of a body or joint, given by its name or number.
-fn index_of(what: &str, any: &Bound<'_, PyAny>, names: &[String]) -> PyResult<usize> {
-    let expected = || match names {
-        [] => format!("nothing: the scene has no {what}"),
-        _ => format!("a number from 0 to {}, or one of {}", names.len() - 1, names.join(", ")),
-    };
-    let found = match any.extract::<String>() {
-        Ok(name) => names.iter().position(|n| *n == name).ok_or(format!("'{name}'")),
-        Err(_) => match any.extract::<usize>() {
-            Ok(number) => Some(number).filter(|&number| number < names.len()).ok_or(number.to_string()),
-            Err(_) => Err(any.repr().map_or_else(|_| kind_of(any), |text| text.to_string())),
-        },
-    };
-    found.map_err(|found| argument(what, found, &expected()))
 }
 
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scene, *, mode = None, time_step = None, duration = None, threads = None, device = None), text_signature = "(scene, *, mode=None, time_step=None, duration=None, threads=None, device=\"cpu\")")]
+    #[pyo3(signature = (scene, *, mode = None, time_step = None, duration = None, threads = None, device = None, history = true), text_signature = "(scene, *, mode=None, time_step=None, duration=None, threads=None, device=\"cpu\", history=True)")]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,
@@ -212,33 +243,26 @@ impl Simulation {
         duration: Option<f64>,
         threads: Option<NonZeroUsize>,
         device: Option<&Bound<'_, PyAny>>,
+        history: bool,
     ) -> PyResult<Self> {
         let device = device::chosen(device)?;
-        let mode: Option<DetectorMode> = mode.map(|any| named("mode", any)).transpose()?;
+        let mode = mode.map(|any| named("mode", any)).transpose()?;
+        let replaced = Replaced { mode, time_step, duration };
         let threads = threads.map(|n| pool::of(Some(n))).transpose().map_err(|e| e.raise(py))?;
         let pool = match &threads {
             Some(threads) => Arc::clone(threads),
             None => pool::shared().map_err(|e| e.raise(py))?,
         };
         let progress = Progress::default();
-        let scene = Source::new(scene)?;
-        let work = || {
-            pool.install(|| {
-                let mut loaded = scene.read().map_err(Error::Scene)?;
-                let file = &mut loaded.scene;
-                file.detector.choose(mode.unwrap_or(file.detector.name()));
-                file.time_step = time_step.unwrap_or(file.time_step);
-                file.duration = duration.unwrap_or(file.duration);
-                file.steps().map_err(|e| Error::Simulate(e.into()))?;
-                Running::begin(loaded, device, &progress)
-            })
-        };
+        let source = Source::new(scene)?;
+        let work =
+            || pool.install(|| Running::begin(Opened::new(source, &replaced, device, &progress)?, history));
         let running = cancellable(py, work, || progress.cancel(), || Ok(()))?.map_err(|e| e.raise(py))?;
         Ok(Self { threads, inner: Mutex::new(running) })
     }
 
     /// Makes `count` steps. The duration of the scene does not limit their number. Ctrl-C ends it
-    /// between two steps; the steps so far remain.
+    /// between two steps; the steps so far remain. No thread is started for a call.
     ///
     /// Raises SimulationError if a step fails. The steps before it remain.
     #[pyo3(signature = (count = 1))]
@@ -252,6 +276,7 @@ impl Simulation {
     /// second. An exception from it ends the run between two steps and is raised.
     #[pyo3(signature = (*, progress = None))]
     fn run<'py>(&self, py: Python<'py>, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        self.try_read(py, |r| r.history().map(|_| ()))?;
         self.advance(py, None, progress)?;
         self.summary(py)
     }
@@ -260,7 +285,7 @@ impl Simulation {
     /// contacts, energies, momenta and the report of each criterion of the scene. passed says
     /// whether the criteria hold; None if there are none.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let summary = self.read(py, |r| r.run.summary(r.engine.system()));
+        let summary = self.try_read(py, |r| Ok(r.history()?.summary(r.system())))?;
         classes::dict(py, &summary)
     }
 
@@ -268,21 +293,20 @@ impl Simulation {
     /// joints that came apart, energy from nowhere, steps that did not converge.
     /// summary()["warnings"] has them with names and values.
     #[getter]
-    fn warnings(&self, py: Python<'_>) -> Vec<String> {
-        let summary = self.read(py, |r| r.run.summary(r.engine.system()));
-        summary.warnings.into_iter().map(|warning| warning.message).collect()
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let summary = self.try_read(py, |r| Ok(r.history()?.summary(r.system())))?;
+        Ok(summary.warnings.into_iter().map(|warning| warning.message).collect())
     }
 
     /// Writes the run file of the steps so far, with the bytes of that of the command.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let saved = self.read(py, |r| r.run.clone().into_record(r.engine.system()).save(&path));
-        saved.map_err(|e| Error::Record(path, e).raise(py))
+        self.try_read(py, |r| r.record()?.save(&path).map_err(|e| Error::Record(path, e)))
     }
 
     /// All states so far, recorded contacts, forces and warnings: Record(times, poses, velocities, ...),
     /// copied.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let record = self.read(py, |r| r.run.clone().into_record(r.engine.system()));
+        let record = self.try_read(py, Running::record)?;
         let (steps, bodies) = (record.times().len(), record.bodies.len());
         let each = || (0..steps).flat_map(|step| (0..bodies).map(move |body| (step, body)));
         let poses = each().filter_map(|(step, body)| record.pose(step, body)).flat_map(|p| of_pose(&p));
@@ -325,9 +349,9 @@ impl Simulation {
     #[pyo3(signature = (*, title = "simulation"))]
     fn view<'py>(&self, py: Python<'py>, title: &str) -> PyResult<Bound<'py, PyAny>> {
         let url = py.detach(|| -> Result<String, PlaybackError> {
-            let Running { engine, view, .. } = &mut *self.locked();
+            let Running { world, view, .. } = &mut *self.locked();
             if view.is_none() {
-                *view = Some(LiveView::open(engine.system(), title)?);
+                *view = Some(LiveView::open(world.engine().system(), title)?);
             }
             Ok(view.as_ref().map(LiveView::url).unwrap_or_default())
         });
@@ -338,57 +362,57 @@ impl Simulation {
     /// Names of the bodies.
     #[getter]
     fn bodies(&self, py: Python<'_>) -> Vec<String> {
-        self.read(py, |r| r.run.record().bodies.clone())
+        self.read(py, |r| settings::bodies(r.system()))
     }
 
-    /// Simulated time, s.
+    /// Time since the beginning or the last reset, s: that of the poses and velocities.
     #[getter]
     fn time(&self, py: Python<'_>) -> f64 {
-        self.read(py, |r| r.run.record().times().last().copied().unwrap_or(0.0))
+        self.read(py, |r| r.world.time())
     }
 
-    /// Number of steps so far.
+    /// Number of steps since the beginning or the last reset.
     #[getter]
     fn steps(&self, py: Python<'_>) -> u64 {
-        self.read(py, |r| r.run.record().steps())
+        self.read(py, |r| r.world.steps())
     }
 
     /// Number of steps of the scene's duration.
     #[getter]
     fn planned_steps(&self, py: Python<'_>) -> u64 {
-        self.read(py, |r| r.run.planned_steps())
+        self.read(py, |r| r.scene.planned)
     }
 
     /// Names of the joints.
     #[getter]
     fn joints(&self, py: Python<'_>) -> Vec<String> {
-        self.read(py, |r| r.engine.system().joints().iter().map(|joint| joint.name.clone()).collect())
+        self.read(py, |r| settings::joints(r.system()))
     }
 
     /// Current coordinates [J] of the joints: the angle of a hinge, rad, with the whole turns since
     /// the start, the travel of a slider, m, the angle by which a ball is bent, rad; 0 for a weld.
     #[getter]
     fn coordinates<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.read(py, |r| r.engine.system().coordinates().to_vec()))
+        PyArray1::from_vec(py, self.read(py, |r| r.system().coordinates().to_vec()))
     }
 
     /// Current rates [J] of the coordinates, rad/s or m/s; 0 for a ball and a weld.
     #[getter]
     fn coordinate_rates<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, self.read(py, |r| r.engine.system().coordinate_rates()))
+        PyArray1::from_vec(py, self.read(py, |r| r.system().coordinate_rates()))
     }
 
     /// The forces of the contacts that push, each the mean over the last step: ContactForces.
     #[getter]
     fn contact_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let forces = self.read(py, |r| r.engine.forces().map(|forces| forces.contacts.clone()));
+        let forces = self.read(py, |r| r.world.engine().forces().map(|forces| forces.contacts.clone()));
         forces::of_contacts(py, &forces.unwrap_or_default())
     }
 
     /// What each joint did to its child, as the mean over the last step: JointForces.
     #[getter]
     fn joint_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let forces = self.read(py, |r| r.engine.forces().map(|forces| forces.joints.clone()));
+        let forces = self.read(py, |r| r.world.engine().forces().map(|forces| forces.joints.clone()));
         forces::of_joints(py, &forces.unwrap_or_default())
     }
 
@@ -417,24 +441,9 @@ impl Simulation {
         spring: Option<[f64; 3]>,
         limit: f64,
     ) -> PyResult<()> {
-        let drive = match (velocity, position, force, spring) {
-            (None, None, None, None) => None,
-            (Some(velocity), None, None, None) => Some(Drive::Velocity(velocity)),
-            (None, Some(position), None, None) => Some(Drive::Position(position)),
-            (None, None, Some(force), None) => Some(Drive::Force(force)),
-            (velocity, None, force, Some([rest, stiffness, damping])) => {
-                let [velocity, force] = [velocity, force].map(Option::unwrap_or_default);
-                Some(Drive::Spring { rest, stiffness, damping, velocity, force })
-            }
-            _ => {
-                let expected =
-                    "one of velocity, position, force and spring, or spring with velocity and force";
-                return Err(argument("joint", "several drives", expected));
-            }
-        };
-        let motor = drive.map(|drive| Motor { drive, limit });
+        let motor = settings::motor(velocity, position, force, spring, limit)?;
         let joint = index_of("joint", joint, &self.joints(py))?;
-        self.change(py, |engine| engine.set_motor(joint, motor))
+        self.set(py, |engine| engine.set_motor(joint, motor).map_err(Error::Dynamics))
     }
 
     /// Sets the force [3], N, on the centre of mass and the torque [3], N m, that act on a body
@@ -451,7 +460,7 @@ impl Simulation {
     ) -> PyResult<()> {
         let [force, torque] = [force, torque].map(DVec3::from_array);
         let body = index_of("body", body, &self.bodies(py))?;
-        self.change(py, |engine| engine.set_wrench(body, Wrench { force, torque }))
+        self.set(py, |engine| engine.set_wrench(body, Wrench { force, torque }).map_err(Error::Dynamics))
     }
 
     /// Sets the pose [7], x y z qx qy qz qw, or [4, 4], and the velocity [6], vx vy vz wx wy wz, of
@@ -468,16 +477,125 @@ impl Simulation {
         let pose = pose.map(|any| poses("pose", any, Count::One)).transpose()?;
         let velocity = velocity.map(|any| velocities("velocity", any, Count::One)).transpose()?;
         let body = index_of("body", body, &self.bodies(py))?;
-        self.change(py, |engine| {
-            let mut state = engine.system().states()[body];
-            if let Some(&pose) = pose.iter().flatten().next() {
-                state.pose = pose;
+        let (pose, velocity) =
+            (pose.and_then(|rows| rows.first().copied()), velocity.and_then(|rows| rows.first().copied()));
+        self.set(py, |engine| settings::set_state(engine, body, pose, velocity))
+    }
+
+    /// Sets the mass of a free body, kg, given by its name or number, from the next step on. The
+    /// body wakes.
+    ///
+    /// - center_of_mass: [3] in the body's frame, m. None: it stays.
+    /// - inertia: [6] xx yy zz xy xz yz about the centre of mass, along the axes of the body's
+    ///   frame, kg m². None: that of the body, in proportion to the mass.
+    ///
+    /// A reset leaves it as it is; restore brings back that of the snapshot.
+    ///
+    /// Raises SimulationError if the body is not free, or no body has such a mass.
+    #[pyo3(signature = (body, mass, *, center_of_mass = None, inertia = None))]
+    fn set_mass(
+        &self,
+        py: Python<'_>,
+        body: &Bound<'_, PyAny>,
+        mass: f64,
+        center_of_mass: Option<[f64; 3]>,
+        inertia: Option<[f64; 6]>,
+    ) -> PyResult<()> {
+        let body = index_of("body", body, &self.bodies(py))?;
+        self.set(py, |engine| settings::set_mass(engine, body, mass, center_of_mass, inertia))
+    }
+
+    /// Sets the coefficient of friction of a body, given by its name or number, from the next step
+    /// on. Between two bodies the geometric mean of theirs acts, unless the scene gives one for the
+    /// pair. The body wakes, with those that it touches. A reset leaves it as it is.
+    fn set_friction(&self, py: Python<'_>, body: &Bound<'_, PyAny>, coefficient: f64) -> PyResult<()> {
+        let body = index_of("body", body, &self.bodies(py))?;
+        self.set(py, |engine| engine.set_friction(body, coefficient).map_err(Error::Dynamics))
+    }
+
+    /// Sets gravity [3], m/s², from the next step on. All bodies wake. A reset leaves it as it is.
+    fn set_gravity(&self, py: Python<'_>, gravity: [f64; 3]) -> PyResult<()> {
+        let gravity = DVec3::from_array(gravity);
+        self.set(py, |engine| engine.set_gravity(gravity).map_err(Error::Dynamics))
+    }
+
+    /// Begins again at time 0, with the states of the scene's beginning, or with these poses
+    /// [B, 7], x y z qx qy qz qw, and velocities [B, 6]. Motors are those of the scene, wrenches
+    /// zero, and the history begins anew. Masses, friction and gravity stay as they were set. The
+    /// steps from there on have the same bytes as those of a new simulation.
+    ///
+    /// Takes some microseconds without a history.
+    #[pyo3(signature = (*, poses = None, velocities = None))]
+    fn reset(
+        &self,
+        py: Python<'_>,
+        poses: Option<&Bound<'_, PyAny>>,
+        velocities: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let first = self.read(py, |r| r.world.first_states().to_vec());
+        let states = settings::states(&first, 1, poses, velocities)?.and_then(|mut rows| rows.pop());
+        self.change(py, |running| {
+            running.world.reset(states).map_err(Error::Dynamics)?;
+            if running.run.is_some() {
+                running.run = Some(running.scene.run(running.system())?);
             }
-            if let Some(&Velocity { linear, angular }) = velocity.iter().flatten().next() {
-                (state.linear, state.angular) = (linear, angular);
-            }
-            engine.set_state(body, state)
+            Ok(())
         })
+    }
+
+    /// All that the next steps depend on, with the history, to go back to: a Snapshot.
+    fn snapshot(&self, py: Python<'_>) -> Snapshot {
+        self.read(py, |r| Snapshot { worlds: vec![r.world.snapshot()], run: r.run.clone() })
+    }
+
+    /// Goes back to a snapshot of this simulation or of a copy. The steps from there on have the
+    /// same bytes as those after the snapshot.
+    ///
+    /// Raises SimulationError if the snapshot is of another simulation.
+    fn restore(&self, py: Python<'_>, snapshot: &Snapshot) -> PyResult<()> {
+        let [world] = &*snapshot.worlds else {
+            return Err(argument(
+                "snapshot",
+                format!("of {} worlds", snapshot.worlds.len()),
+                "one of a Simulation",
+            ));
+        };
+        self.change(py, |running| {
+            let run = match running.run {
+                Some(_) => Some(snapshot.run.clone().ok_or(Error::NoHistory)?),
+                None => None,
+            };
+            running.world.restore(world).map_err(Error::Dynamics)?;
+            running.run = run;
+            Ok(())
+        })
+    }
+
+    /// A simulation that goes on from the same moment on its own. It shares the meshes.
+    fn copy(&self, py: Python<'_>) -> Self {
+        Self { threads: self.threads.clone(), inner: Mutex::new(self.read(py, Running::copy)) }
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        self.copy(py)
+    }
+
+    /// Masses [B], kg; inf of bodies that are not free.
+    #[getter]
+    fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.read(py, |r| settings::masses(r.system()).collect()))
+    }
+
+    /// Coefficients of friction [B] of the bodies.
+    #[getter]
+    fn frictions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.read(py, |r| settings::frictions(r.system()).collect()))
+    }
+
+    /// Gravity [3], m/s².
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.read(py, |r| r.system().gravity.to_array()))
     }
 
     /// Current poses [B, 7] of the bodies' frames, x y z qx qy qz qw.
@@ -499,13 +617,14 @@ impl Simulation {
     /// motion of the step could close. Instances are the bodies.
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (found, hidden) = self.read(py, |r| (r.engine.contacts().to_vec(), r.engine.hidden().to_vec()));
+        let (found, hidden) =
+            self.read(py, |r| (r.world.engine().contacts().to_vec(), r.world.engine().hidden().to_vec()));
         contacts::of_step(py, &found, &hidden)
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
         let (bodies, steps, planned) =
-            self.read(py, |r| (r.states().len(), r.run.record().steps(), r.run.planned_steps()));
+            self.read(py, |r| (r.states().len(), r.world.steps(), r.scene.planned));
         format!("<tesdf.Simulation: {bodies} bodies, step {steps} of {planned}>")
     }
 }

@@ -36,6 +36,8 @@
     simulation.set_motor("slide", velocity=0.1)         # set_wrench, set_state
     simulation.step()                                   # simulation.poses, simulation.contacts, ...
     simulation.run()["passed"]                          # to the end; the summary, with the criteria
+    moment = simulation.snapshot()                      # restore(moment), reset, copy; set_mass, set_friction, ...
+    worlds = tesdf.Worlds("scene.toml", 256)            # arrays [256, ...]; worlds.step(), worlds.reset(done)
     tesdf.view(simulation, "page.html")                 # plays it in a browser; tesdf.export for GLB and rerun
 
 All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
@@ -52,6 +54,8 @@ from ._native import (
     PatchTracker,
     Scene,
     Simulation,
+    Snapshot,
+    Worlds,
     __version__,
     check,
     devices,
@@ -150,12 +154,14 @@ __all__ = [
     "SceneError",
     "Simulation",
     "SimulationError",
+    "Snapshot",
     "Sphere",
     "StepContacts",
     "TouchingFeatures",
     "UsdMesh",
     "VerifyReport",
     "WhyReport",
+    "Worlds",
     "__version__",
     "check",
     "clearance",

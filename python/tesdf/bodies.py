@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypedDict, Union
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypedDict, Union
 
 from . import _native
 from .contacts import Contacts
@@ -13,7 +13,17 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from typing_extensions import Unpack
 
+class HasMesh(Protocol):
+    """A mesh, such as one of trimesh."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+
 Shape = Union["_native.Asset", Plane, Box, Sphere, Capsule]
+Body = Union[Shape, tuple["npt.ArrayLike", "npt.ArrayLike"], HasMesh]
 
 
 class WhyOptions(TypedDict, total=False):
@@ -39,8 +49,8 @@ class DetectOptions(WhyOptions, total=False):
 
 
 def collide(
-    a: Shape,
-    b: Shape,
+    a: Body,
+    b: Body,
     *,
     pose_a: npt.ArrayLike | None = None,
     pose_b: npt.ArrayLike | None = None,
@@ -48,15 +58,16 @@ def collide(
 ) -> Contacts:
     """The contacts of two bodies, as the instances 0 and 1. As `tesdf collide A B`.
 
-    A body is an `Asset`, `Plane`, `Box`, `Sphere` or `Capsule`. Its pose has seven numbers, x y z
+    A body is an `Asset`, `Plane`, `Box`, `Sphere` or `Capsule`, or a mesh in memory, (vertices, faces) or
+    an object that has both, which is encoded with the preset "fast". Its pose has seven numbers, x y z
     qx qy qz qw, or is a matrix [4, 4]; None is the identity. `Scene.detect` explains the options.
     """
     return _native.pair(a, b, pose_a, pose_b).detect(**options)
 
 
 def clearance(
-    a: Shape,
-    b: Shape,
+    a: Body,
+    b: Body,
     *,
     pose_a: npt.ArrayLike | None = None,
     pose_b: npt.ArrayLike | None = None,
@@ -71,8 +82,8 @@ def clearance(
 
 
 def time_of_impact(
-    a: Shape,
-    b: Shape,
+    a: Body,
+    b: Body,
     *,
     pose_a: npt.ArrayLike | None = None,
     pose_b: npt.ArrayLike | None = None,
@@ -102,8 +113,8 @@ def time_of_impact(
 
 
 def why(
-    a: Shape,
-    b: Shape,
+    a: Body,
+    b: Body,
     part: int | None = None,
     *,
     pose_a: npt.ArrayLike | None = None,

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::Progress;
-use tesdf_playback::LiveView;
+use tesdf_playback::{LiveFrame, LiveView};
 use tesdf_sim::criterion::Criteria;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{AssetCache, DetectorMode, LoadedScene, SceneError};
@@ -177,7 +177,8 @@ pub fn run_with(
     let ended = simulate_from(&loaded.scene, &mut engine, begun, |moment| {
         recorder.push(moment)?;
         if let Some(live) = &mut live {
-            let shown = if moment.step == moment.steps { live.end(moment) } else { live.show(moment) };
+            let frame = LiveFrame::from(moment);
+            let shown = if moment.step == moment.steps { live.end(&frame) } else { live.show(&frame) };
             // The run goes on without its page.
             shown.unwrap_or_else(|e| report::warning(&e.to_string()));
         }

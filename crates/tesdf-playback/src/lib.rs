@@ -35,7 +35,7 @@ pub use error::PlaybackError;
 pub use forces::{DrawnForce, FrameForces};
 pub use frames::Frames;
 pub use glb::{GlbOptions, glb};
-pub use live::LiveView;
+pub use live::{LiveFrame, LiveView};
 pub use mesh::Mesh;
 pub use normals::SmoothNormals;
 pub use page::{Arrows, page};

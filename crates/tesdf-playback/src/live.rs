@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 use tesdf::glam::{DQuat, DVec3};
-use tesdf_sim::{Moment, RunRecord, System};
+use tesdf_sim::{Forces, Moment, RunRecord, System};
 
 use crate::forces::{DrawnForce, drawn};
 use crate::page;
@@ -23,6 +23,25 @@ const HEAD: u64 = 16_384;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Most connections at a time.
 const MOST: usize = 32;
+
+/// A state of a run that a [`LiveView`] shows.
+#[derive(Clone, Copy, Debug)]
+pub struct LiveFrame<'a> {
+    /// Number of steps so far.
+    pub step: u64,
+    /// Simulated time, s.
+    pub time: f64,
+    /// The bodies.
+    pub system: &'a System,
+    /// The forces of the last step, where they are known.
+    pub forces: Option<&'a Forces>,
+}
+
+impl<'a> From<&Moment<'a>> for LiveFrame<'a> {
+    fn from(&Moment { step, time, system, forces, .. }: &Moment<'a>) -> Self {
+        Self { step, time, system, forces }
+    }
+}
 
 /// A page on this machine that follows a run while it is made. It is served on the loopback
 /// interface alone, until this value is dropped; pages that are open then keep what they have.
@@ -83,17 +102,17 @@ impl LiveView {
         format!("http://{}/", self.address)
     }
 
-    /// Shows the bodies after a step, and its forces. States that follow each other within 16 ms of
+    /// Shows the bodies after a step. States that follow each other within 16 ms of
     /// wall time are left out.
     ///
     /// # Errors
     /// [`PlaybackError::State`] for a state that is not valid.
-    pub fn show(&mut self, moment: &Moment<'_>) -> Result<(), PlaybackError> {
+    pub fn show(&mut self, frame: &LiveFrame<'_>) -> Result<(), PlaybackError> {
         if self.last.is_some_and(|last| last.elapsed() < PAUSE) {
             return Ok(());
         }
         self.last = Some(Instant::now());
-        let Moment { step, time, system, forces, .. } = *moment;
+        let LiveFrame { step, time, system, forces } = *frame;
         let mut poses = Vec::with_capacity(7 * self.origins.len());
         for (body, state) in system.states().iter().enumerate().take(self.origins.len()) {
             let pose = checked(state.pose).map_err(|reason| PlaybackError::State {
@@ -126,9 +145,9 @@ impl LiveView {
     ///
     /// # Errors
     /// [`PlaybackError::State`] for a state that is not valid.
-    pub fn end(&mut self, moment: &Moment<'_>) -> Result<(), PlaybackError> {
+    pub fn end(&mut self, frame: &LiveFrame<'_>) -> Result<(), PlaybackError> {
         self.last = None;
-        self.show(moment)?;
+        self.show(frame)?;
         self.shared.sent().has_ended = true;
         self.shared.grown.notify_all();
         Ok(())

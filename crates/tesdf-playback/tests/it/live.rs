@@ -53,8 +53,8 @@ fn a_page_is_sent_the_states_and_forces_of_the_run() {
     let mut last = None;
     simulate(&loaded.scene, &mut engine, |moment| {
         match moment.step == moment.steps {
-            true => view.end(moment).unwrap(),
-            false => view.show(moment).unwrap(),
+            true => view.end(&moment.into()).unwrap(),
+            false => view.show(&moment.into()).unwrap(),
         }
         last = Some((moment.system.states()[1].pose.translation, moment.forces.unwrap().clone()));
         ControlFlow::Continue(())

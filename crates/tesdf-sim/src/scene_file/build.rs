@@ -217,6 +217,7 @@ impl Shapes {
         }
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
+                let in_memory = body.asset.as_ref().and_then(|path| scene.memory.get(path));
                 let file = scene.resolve(file);
                 // A file that is reached by several paths is opened only once.
                 let path = file.canonicalize().unwrap_or_else(|_| file.clone());
@@ -224,18 +225,20 @@ impl Shapes {
                 if let Some(&shape) = self.0.get(&key) {
                     return Ok(shape);
                 }
-                let opened = match body.asset {
-                    Some(_) => TeSdf::open(&file)
+                let opened = match (in_memory, &body.asset) {
+                    (Some(asset), _) => Arc::clone(asset),
+                    (None, Some(_)) => TeSdf::open(&file)
+                        .map(Arc::new)
                         .map_err(|e| ShapeFailure::Reason(format!("{}: {e}", file.display())))?,
-                    None => {
+                    (None, None) => {
                         let encode = || encode_mesh(&file, inside, repair, progress);
-                        match &scene.assets {
+                        Arc::new(match &scene.assets {
                             Some(assets) => assets.get(&file, inside, repair, encode)?,
                             None => encode()?,
-                        }
+                        })
                     }
                 };
-                let shape = add_shape(system, Shape::Mesh(Arc::new(opened)))?;
+                let shape = add_shape(system, Shape::Mesh(opened))?;
                 self.0.insert(key, shape);
                 return Ok(shape);
             }

@@ -333,6 +333,7 @@ impl BodySection {
             kinematic: false,
             friction: 0.0,
             restitution: 0.0,
+            linear_damping: 0.0,
             angular_damping: 0.0,
             memberships: every(),
             filter: every(),

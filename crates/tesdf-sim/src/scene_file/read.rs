@@ -1,7 +1,10 @@
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Deserialize;
 use serde_json::Value;
+use tesdf::TeSdf;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
@@ -25,6 +28,8 @@ pub struct LoadedScene {
     pub path: PathBuf,
     /// Where encoded meshes are kept; `None`, as it is read: nowhere.
     pub assets: Option<AssetCache>,
+    /// Assets that are in no file: a body whose `asset` is the path here has this one.
+    pub memory: BTreeMap<PathBuf, Arc<TeSdf>>,
     /// Empty when the scene comes from JSON.
     pub(super) text: String,
 }
@@ -90,7 +95,7 @@ impl LoadedScene {
             })?;
             scene.criterion.insert(reader.name, (reader.toml)(table.into()).map_err(refuse)?);
         }
-        Self { scene, path, assets: None, text }.with_copies()
+        Self { scene, path, assets: None, memory: BTreeMap::new(), text }.with_copies()
     }
 
     /// The scene with each copy of a body as a body of its own, and with the bodies and joints of its
@@ -213,7 +218,7 @@ impl LoadedScene {
         json["bodies"] = Value::Array(Vec::new());
         let scene: SceneFile = serde_json::from_value(json).map_err(|e| refuse(e.to_string()))?;
         let scene = SceneFile { bodies, criterion, ..scene };
-        Self { scene, path, assets: None, text: String::new() }.with_copies()
+        Self { scene, path, assets: None, memory: BTreeMap::new(), text: String::new() }.with_copies()
     }
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
