@@ -502,18 +502,23 @@ impl System {
         let mut updates = Vec::with_capacity(states.len());
         for (body, state) in self.bodies.iter().zip(states) {
             let before = *self.scene.instance(body.instance)?;
-            let velocity = match body.mass {
-                Mass::Fixed => Velocity::default(),
-                Mass::Kinematic => Velocity { linear: state.linear, angular: state.angular },
-                Mass::Free(mass) => {
-                    let arm = state.pose.rotation * mass.center;
-                    Velocity { linear: state.linear - state.angular.cross(arm), angular: state.angular }
-                }
-            };
+            let velocity = Self::velocity_of_origin(body, state);
             updates.push((body.instance, Instance { pose: state.pose, velocity, ..before }));
         }
         self.scene.update(&updates)?;
         Ok(&self.scene)
+    }
+
+    /// The velocity of the origin of a body, and its angular velocity, in a state.
+    pub(crate) fn velocity_of_origin(body: &Body, state: &State) -> Velocity {
+        match body.mass {
+            Mass::Fixed => Velocity::default(),
+            Mass::Kinematic => Velocity { linear: state.linear, angular: state.angular },
+            Mass::Free(mass) => {
+                let arm = state.pose.rotation * mass.center;
+                Velocity { linear: state.linear - state.angular.cross(arm), angular: state.angular }
+            }
+        }
     }
 
     /// Marks instances of the scene as still, and no others.

@@ -3,8 +3,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 use nalgebra::Vector6;
+use tesdf::collide::internal::Ahead;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Shape, instance_pairs,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Shape, Velocity,
+    instance_pairs,
 };
 
 use super::bounce::{Bounces, Meeting};
@@ -80,11 +82,12 @@ impl Newton {
         collide.validate()?;
         let diagonals = system.bodies().iter().map(|body| system.diagonal(body));
         let sizes = diagonals.collect::<Result<_, CollideError>>()?;
+        let reach = greatest_reach(&system)?;
         let (detector, found) = (Arc::new(detector), Contacts::default());
         let surfaces = Arc::new(Surfaces::new(system.scene(), collide.mode));
         let forces = Forces::none(system.joints().len());
         let (sleep, kept) = (Sleep::new(system.states()), Kept::default());
-        Ok(Self { system, detector, collide, options, sizes, surfaces, found, forces, sleep, kept })
+        Ok(Self { system, detector, collide, options, sizes, reach, surfaces, found, forces, sleep, kept })
     }
 
     /// Sets gravity, m/s², from now on. All bodies wake.
@@ -200,9 +203,28 @@ impl Newton {
 
     /// Detects as far ahead as the velocities of `ahead` move the bodies.
     fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
-        let contacts = self.detect(step, ahead, HiddenSearch::On)?;
-        let options = self.options_of(step.h);
-        Ok(Look::new(contacts, self.system.scene_at(ahead)?, &options)?)
+        Ok(Look::new(self.detect(step, ahead, HiddenSearch::On)?))
+    }
+
+    /// Whether no body moves so far with the velocities of `ahead` that a look would have to be
+    /// extended, wherever it looked: each pair closes by less than the contact distance.
+    ///
+    /// The origins of two bodies whose boxes meet are at most `2 √3 r` apart, where `r` is the greatest
+    /// distance of a point from its origin. So with the greatest way `w` of an origin and the greatest
+    /// rotation `t`, points move by at most `2 w + 6 r t` as seen from the other body, and by terms of
+    /// second order.
+    fn is_slow(&self, step: &Step, ahead: &[State]) -> bool {
+        let (mut way, mut turn) = (0.0, 0.0);
+        for (k, (body, state)) in self.system.bodies().iter().zip(ahead).enumerate() {
+            let Velocity { linear, angular } = System::velocity_of_origin(body, state);
+            way = f64::max(way, step.h * linear.length());
+            turn = f64::max(turn, step.h * angular.length());
+            // A plane that turns moves far away without bounds.
+            if angular != DVec3::ZERO && self.sizes[k].is_infinite() {
+                return false;
+            }
+        }
+        turn <= 0.1 && 4.0 * (way + 4.0 * turn * self.reach) <= self.options_of(step.h).contact_distance
     }
 
     /// The pairs of bodies that move closer at the velocities of `ahead` than `look` has looked.
@@ -233,7 +255,7 @@ impl Newton {
     fn look_on(
         &mut self,
         step: &Step,
-        look: &Look,
+        look: &mut Look,
         ahead: &mut [State],
         velocities: &[Vector6<f64>],
     ) -> Result<bool, DynamicsError> {
@@ -244,6 +266,11 @@ impl Newton {
         for (free, _) in step.free.iter().zip(&step.deep).filter(|(_, deep)| **deep) {
             ahead[free.body] = foreseen[free.body];
         }
+        if self.is_slow(step, ahead) {
+            return Ok(false);
+        }
+        let options = self.options_of(step.h);
+        look.measure(self.system.scene_at(&foreseen)?, &options)?;
         let own = ahead.to_vec();
         let change = |body: usize| {
             let (from, to) = (&foreseen[body], &own[body]);
@@ -329,10 +356,11 @@ impl Newton {
         }
         let mut solved = self.velocities(&mut step, look.contacts.as_slice())?;
         for _ in 0..MORE_LOOKS {
-            if !self.look_on(&step, &look, &mut ahead, &solved.velocities)? {
+            if !self.look_on(&step, &mut look, &mut ahead, &solved.velocities)? {
                 break;
             }
-            let more = self.look(&mut step, &ahead)?;
+            let mut more = self.look(&mut step, &ahead)?;
+            more.measure(self.system.scene(), &self.options_of(step.h))?;
             if !look.extend(more, self.system.scene()) {
                 break;
             }
@@ -411,6 +439,19 @@ impl Newton {
         report.asleep = self.end_sleep(whole, &touching)?;
         Ok(report)
     }
+}
+
+/// The greatest distance of a point of a body from its origin, m. Planes do not count.
+fn greatest_reach(system: &System) -> Result<f64, CollideError> {
+    let (scene, mut greatest) = (system.scene(), 0.0);
+    for body in system.bodies() {
+        let instance = scene.instance(body.instance)?;
+        let Ahead { reach, .. } = Ahead::new(instance, scene.shape(instance.shape)?, 0.0);
+        if reach.is_finite() {
+            greatest = f64::max(greatest, reach);
+        }
+    }
+    Ok(greatest)
 }
 
 impl Dynamics for Newton {

@@ -14,6 +14,7 @@ pub type Pair = (InstanceId, InstanceId);
 pub struct Look {
     /// All that one of the detections has found.
     pub contacts: Contacts,
+    /// Of each detection; none until they are asked for.
     ways: Vec<Way>,
 }
 
@@ -33,10 +34,18 @@ struct Between {
 }
 
 impl Look {
-    /// `contacts` are those of a scene with these options.
-    pub fn new(contacts: Contacts, scene: &Scene, options: &CollideOptions) -> Result<Self, CollideError> {
-        let way = Way::new(scene, options.contact_distance, options.speculative_time)?;
-        Ok(Self { contacts, ways: vec![way] })
+    /// `contacts` are those of one detection.
+    pub fn new(contacts: Contacts) -> Self {
+        Self { contacts, ways: Vec::new() }
+    }
+
+    /// Finds how far the first detection has looked, if that is not known: that of `scene` with these
+    /// options.
+    pub fn measure(&mut self, scene: &Scene, options: &CollideOptions) -> Result<(), CollideError> {
+        if self.ways.is_empty() {
+            self.ways.push(Way::new(scene, options.contact_distance, options.speculative_time)?);
+        }
+        Ok(())
     }
 
     /// The pairs that the velocities of `scene` bring closer in `time`, at some place, than was

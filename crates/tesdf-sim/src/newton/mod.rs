@@ -109,6 +109,8 @@ pub struct Newton {
     options: NewtonOptions,
     /// Diagonal of each body's bounding box, m.
     sizes: Vec<f64>,
+    /// The greatest distance of a point of a body from its origin, m. Planes do not count.
+    reach: f64,
     /// For bodies that overlap deeply.
     surfaces: Arc<Surfaces>,
     /// What the last step found at its beginning.
