@@ -18,6 +18,7 @@ use super::look::Look;
 use super::passing::{MOST_TURN, Passing};
 use super::rotation::Rotation;
 use super::rows::FreeBody;
+use super::seen::Seen;
 use super::sleep::Sleep;
 use super::step::{Step, set_velocities};
 use super::velocities::Solved;
@@ -86,8 +87,21 @@ impl Newton {
         let (detector, found) = (Arc::new(detector), Contacts::default());
         let surfaces = Arc::new(Surfaces::new(system.scene(), collide.mode));
         let forces = Forces::none(system.joints().len());
-        let (sleep, kept) = (Sleep::new(system.states()), Kept::default());
-        Ok(Self { system, detector, collide, options, sizes, reach, surfaces, found, forces, sleep, kept })
+        let (sleep, kept, seen) = (Sleep::new(system.states()), Kept::default(), Seen::default());
+        Ok(Self {
+            system,
+            detector,
+            collide,
+            options,
+            sizes,
+            reach,
+            surfaces,
+            found,
+            forces,
+            sleep,
+            kept,
+            seen,
+        })
     }
 
     /// Sets gravity, m/s², from now on. All bodies wake.
@@ -204,6 +218,32 @@ impl Newton {
     /// Detects as far ahead as the velocities of `ahead` move the bodies.
     fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
         Ok(Look::new(self.detect(step, ahead, HiddenSearch::On)?))
+    }
+
+    /// The first look of a part: it looks only at pairs of which a body has moved since the last one.
+    fn first_look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
+        let start = Instant::now();
+        let options = CollideOptions { hidden: HiddenSearch::On, ..self.options_of(step.h) };
+        self.system.scene_at(ahead)?;
+        let contacts = match self.seen.unmoved(&self.system, &options) {
+            None => self.detector.detect(self.system.scene(), &options)?,
+            Some(unmoved) => {
+                let found = match unmoved.is_all() {
+                    true => Contacts::default(),
+                    false => {
+                        self.mark(unmoved.bodies());
+                        let found = self.detector.detect(self.system.scene(), &options);
+                        self.mark(unmoved.still());
+                        found?
+                    }
+                };
+                self.seen.with(found, &unmoved, &self.system)
+            }
+        };
+        self.seen.keep(&self.system, &options, &contacts);
+        step.report.detections += 1;
+        step.report.detection += start.elapsed();
+        Ok(Look::new(contacts))
     }
 
     /// Whether no body moves so far with the velocities of `ahead` that a look would have to be
@@ -345,7 +385,7 @@ impl Newton {
         let falling = pack(time_step * self.system.gravity, DVec3::ZERO);
         let target: Vec<_> = step.target.iter().map(|v| v - falling).collect();
         set_velocities(&mut ahead, &step.free, &target);
-        let mut look = self.look(&mut step, &ahead)?;
+        let mut look = self.first_look(&mut step, &ahead)?;
         if self.wakes(look.contacts.as_slice()) {
             return Ok(Made::Again);
         }

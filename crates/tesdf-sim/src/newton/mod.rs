@@ -59,6 +59,7 @@ mod resting;
 mod rotation;
 mod rows;
 mod runs;
+mod seen;
 mod sleep;
 mod snapshot;
 mod solve;
@@ -70,12 +71,15 @@ pub use snapshot::Snapshot;
 
 use deep::Surfaces;
 use kept::Kept;
+use seen::Seen;
 use sleep::Sleep;
 
 /// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
 /// signature implement this trait.
 pub trait Detect: Send + Sync {
     /// All contacts within the distances of `options`, in an order that depends on the scene alone.
+    /// Those of a pair depend on its two instances alone: [`Newton`] does not ask again for pairs of
+    /// instances that stay as they were, and [marks](Scene::set_still) them.
     ///
     /// # Errors
     /// The errors of the detection, as [`CollideError`].
@@ -119,4 +123,5 @@ pub struct Newton {
     forces: Forces,
     sleep: Sleep,
     kept: Kept,
+    seen: Seen,
 }

@@ -1,0 +1,202 @@
+//! What the last look has found, so that bodies that have not moved since are not looked at again.
+//!
+//! What is found of a pair depends on the states of its two bodies and on the options alone. Where
+//! these are the same bit for bit, so are the contacts of a new detection. So this is no part of the
+//! state of a run: nothing changes where it is dropped.
+use std::iter::zip;
+
+use tesdf::collide::{CollideOptions, Contact, Contacts, Instance, InstanceId};
+
+use crate::{Body, System};
+
+/// The last look: the scene that it has looked at, and what it found.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// `None` before the first one.
+    options: Option<CollideOptions>,
+    /// Of each body.
+    instances: Vec<Instance>,
+    /// The bodies between which nothing was detected.
+    still: Vec<bool>,
+    contacts: Contacts,
+}
+
+/// Which bodies of a scene need not be looked at.
+pub struct Unmoved {
+    /// Of each body, whether it is as the last look saw it.
+    bodies: Vec<bool>,
+    /// Of each body, whether the caller has marked it as still.
+    still: Vec<bool>,
+}
+
+impl Seen {
+    /// The bodies whose pairs the last look has seen as they are now. `None` where there are none, or
+    /// where marks cannot tell which they are.
+    pub fn unmoved(&self, system: &System, options: &CollideOptions) -> Option<Unmoved> {
+        if self.options != Some(*options) {
+            return None;
+        }
+        let still = still(system);
+        let is_seen = |(k, body): (usize, &Body)| {
+            // Nothing was detected between bodies that were still.
+            let was_still = self.still[k] && !still[k];
+            let now = system.scene().instance(body.instance);
+            !was_still && now.is_ok_and(|now| is_same(now, &self.instances[k]))
+        };
+        let bodies: Vec<bool> = system.bodies().iter().enumerate().map(is_seen).collect();
+        // Marks say of bodies, not of pairs, that nothing is to be detected.
+        let fits = bodies.contains(&true) && zip(&still, &bodies).all(|(still, seen)| *seen || !still);
+        fits.then_some(Unmoved { bodies, still })
+    }
+
+    /// The contacts of a scene of whose pairs with a body that has moved `found` are those.
+    pub fn with(&self, found: Contacts, unmoved: &Unmoved, system: &System) -> Contacts {
+        // A detector may ignore marks.
+        let is_found = |a: InstanceId, b: InstanceId| !are(&unmoved.bodies, [a, b], system);
+        let is_seen = |a: InstanceId, b: InstanceId| !is_found(a, b) && !are(&unmoved.still, [a, b], system);
+        let world = |id| system.scene().instance(id).map_or(0, |instance| instance.world);
+        let key = |a: InstanceId, b: InstanceId| (world(a), a.min(b), a.max(b));
+        let of_pairs = |contacts| pairs(contacts).map(|(run, [a, b])| (key(a, b), run, [a, b]));
+        let mut runs: Vec<_> = of_pairs(found.as_slice()).filter(|(.., [a, b])| is_found(*a, *b)).collect();
+        runs.extend(of_pairs(self.contacts.as_slice()).filter(|(.., [a, b])| is_seen(*a, *b)));
+        runs.sort_by_key(|(key, ..)| *key);
+        let mut contacts = Vec::with_capacity(found.len() + self.contacts.len());
+        runs.iter().for_each(|(_, run, _)| contacts.extend_from_slice(run));
+        let Contacts { statistics, mut hidden, mut reductions, .. } = found;
+        hidden.retain(|h| is_found(h.instance_a, h.instance_b));
+        hidden.extend(self.contacts.hidden.iter().filter(|h| is_seen(h.instance_a, h.instance_b)));
+        hidden.sort_by_key(|h| key(h.instance_a, h.instance_b));
+        reductions.retain(|r| is_found(r.instance_a, r.instance_b));
+        let of_seen = self.contacts.reductions.iter();
+        reductions.extend(of_seen.filter(|r| is_seen(r.instance_a, r.instance_b)).copied());
+        reductions.sort_by_key(|r| key(r.instance_a, r.instance_b));
+        Contacts::new(contacts, statistics, reductions, hidden)
+    }
+
+    /// Keeps what a look has found in the scene as it is now.
+    pub fn keep(&mut self, system: &System, options: &CollideOptions, contacts: &Contacts) {
+        self.options = Some(*options);
+        self.still = still(system);
+        self.instances.clear();
+        let instances = system.bodies().iter().map(|body| system.scene().instance(body.instance));
+        self.instances.extend(instances.flatten());
+        self.contacts.clone_from(contacts);
+    }
+}
+
+impl Unmoved {
+    /// Whether nothing has moved.
+    pub fn is_all(&self) -> bool {
+        !self.bodies.contains(&false)
+    }
+
+    /// Of each body, whether it is as the last look saw it.
+    pub fn bodies(&self) -> &[bool] {
+        &self.bodies
+    }
+
+    /// Of each body, whether the caller has marked it as still.
+    pub fn still(&self) -> &[bool] {
+        &self.still
+    }
+}
+
+/// Whether both of these instances are marked.
+fn are(marked: &[bool], ids: [InstanceId; 2], system: &System) -> bool {
+    ids.into_iter().all(|id| system.body_of(id).is_some_and(|body| marked[body]))
+}
+
+/// The bodies that are marked as still in the scene.
+fn still(system: &System) -> Vec<bool> {
+    let scene = system.scene();
+    let is_still = |body: &Body| !scene.still().is_empty() && scene.is_still(body.instance);
+    system.bodies().iter().map(is_still).collect()
+}
+
+/// Whether two states of a body are the same, bit for bit.
+fn is_same(now: &Instance, then: &Instance) -> bool {
+    let bits = |instance: &Instance| {
+        let Instance { pose, velocity, .. } = instance;
+        let [a, b, c] = [pose.translation, velocity.linear, velocity.angular].map(|v| v.to_array());
+        [a, b, c].map(|v| v.map(f64::to_bits)).map(|v| (v[0], v[1], v[2]))
+    };
+    let turn = |instance: &Instance| instance.pose.rotation.to_array().map(f64::to_bits);
+    // Zeros of both signs are equal.
+    now == then && bits(now) == bits(then) && turn(now) == turn(then)
+}
+
+/// The contacts of each pair, with its instances.
+fn pairs(contacts: &[Contact]) -> impl Iterator<Item = (&[Contact], [InstanceId; 2])> {
+    let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
+    let runs = contacts.chunk_by(move |x, y| ids(x) == ids(y));
+    runs.map(|run| (run, [run[0].instance_a, run[0].instance_b]))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use tesdf::collide::{CollideError, Scene, detect};
+
+    use super::*;
+    use crate::Dynamics;
+    use crate::newton::Newton;
+    use crate::scene_file::LoadedScene;
+
+    /// Boxes that stand on a plane and on each other, one that leans, and a ball that hits them.
+    const BODIES: &str = r#"
+        bodies = [
+            { name = "floor", shape = "plane", fixed = true, friction = 0.5 },
+            { name = "a", shape = { box = { half_extents = [0.05, 0.04, 0.03] } }, mass = 1, friction = 0.5, translation = [0.0, 0.02, 0.03] },
+            { name = "b", shape = { box = { half_extents = [0.05, 0.04, 0.03] } }, mass = 1, friction = 0.5, translation = [0.01, 0.02, 0.09] },
+            { name = "c", shape = { box = { half_extents = [0.05, 0.04, 0.03] } }, mass = 1, friction = 0.5, translation = [0.3, 0.02, 0.03] },
+            { name = "d", shape = { box = { half_extents = [0.05, 0.04, 0.03] } }, mass = 1, friction = 0.5, translation = [0.6, 0.02, 0.07], rotation = [0, 0.3826834323650898, 0, 0.9238795325112867] },
+            { name = "e", shape = { sphere = { radius = 0.02 } }, mass = 0.2, friction = 0.5, translation = [-0.6, 0.02, 0.02], velocity = [1, 0, 0] },
+        ]
+    "#;
+
+    /// An engine, and the numbers of its detections and of the instances that these looked at.
+    fn engine(sleep: f64) -> (Newton, Arc<[AtomicUsize; 2]>) {
+        let text = format!("time_step = 5e-3\nduration = 1\nsolver.sleep = {sleep:?}\n{BODIES}");
+        let loaded = LoadedScene::parse(text, "scene.toml").unwrap();
+        let counts = Arc::new([(); 2].map(|()| AtomicUsize::new(0)));
+        let count = counts.clone();
+        let detector = move |scene: &Scene, options: &CollideOptions| -> Result<Contacts, CollideError> {
+            count[0].fetch_add(1, Ordering::Relaxed);
+            count[1].fetch_add(scene.instances().len() - scene.still().len(), Ordering::Relaxed);
+            detect(scene, options)
+        };
+        (loaded.newton_with(loaded.system().unwrap(), detector).unwrap(), counts)
+    }
+
+    /// The bits of the states and the contacts of an engine.
+    fn bits(engine: &Newton) -> Vec<u64> {
+        let of_state = |state: &crate::State| {
+            let [a, b, c] = [state.pose.translation, state.linear, state.angular].map(|v| v.to_array());
+            [a.as_slice(), &b, &c, &state.pose.rotation.to_array()].concat()
+        };
+        let of_contact = |c: &Contact| {
+            let [a, b, n] = [c.point_a, c.point_b, c.normal].map(|v| v.to_array());
+            [a.as_slice(), &b, &n, &[c.distance, f64::from(c.instance_a.0), f64::from(c.face_a)]].concat()
+        };
+        let states = engine.system().states().iter().flat_map(of_state);
+        states.chain(engine.contacts().iter().flat_map(of_contact)).map(f64::to_bits).collect()
+    }
+
+    /// Also where bodies fall asleep, and wake.
+    #[test]
+    fn what_has_been_seen_is_what_a_new_detection_finds() {
+        for sleep in [0.0, 0.1] {
+            let [(mut with, some), (mut without, all)] = [engine(sleep), engine(sleep)];
+            for step in 0..250 {
+                without.seen = Seen::default();
+                let reports = [&mut with, &mut without].map(|engine| engine.step(5e-3).unwrap());
+                assert_eq!(bits(&with), bits(&without), "sleep {sleep}, step {step}");
+                assert_eq!(reports[0].contacts, reports[1].contacts);
+            }
+            let [some, all] = [some, all].map(|counts| counts.each_ref().map(|n| n.load(Ordering::Relaxed)));
+            assert!(some[1] < all[1] && 2 * some[0] < 3 * all[0], "sleep {sleep}: {some:?} of {all:?}");
+        }
+    }
+}
