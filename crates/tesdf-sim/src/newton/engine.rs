@@ -416,6 +416,7 @@ impl Newton {
         let passing = self.passing(&mut step, &states)?;
         let is_loose = self.is_loose(&states, time_step, whole);
         set_velocities(&mut states, &step.free, &carried);
+        self.hold(&step, &velocities, &mut states);
         let mut report = step.report;
         let found = look.contacts;
         report.solution = begin.elapsed().saturating_sub(report.detection);

@@ -38,6 +38,7 @@ mod engine;
 mod far_contacts;
 mod gaps;
 mod geometric;
+mod hold;
 mod impacts;
 mod integrate;
 mod interior;
