@@ -179,7 +179,7 @@ impl Newton {
                 hit.iter().map(row).chain(joints.iter().cloned()).collect()
             };
             let motion = Motion::new(&free, &velocities);
-            let guess = Guess { velocities: &velocities, forces: None };
+            let guess = Guess { velocities: &velocities, forces: None, known: None };
             let stopping = rows(&|_| 0.0);
             let (stopped, compressing) = self.solve(step, &motion, &stopping, Gap::Position, guess);
             let opening = rows(&|place| match place.approach(&velocities, h) {

@@ -47,6 +47,13 @@ const NEARLY_OPEN: f64 = 1e-3;
 /// A body's points are within about this multiple of its radius of gyration.
 const LEVER: f64 = 2.0;
 
+impl Minimum {
+    /// A solution that is known.
+    pub fn known(velocity: Vec<Vector6<f64>>, forces: Vec<RowForce>) -> Self {
+        Self { velocity, forces, iterations: 0, converged: true, residual: Residual::default() }
+    }
+}
+
 impl<'a> Problem<'a> {
     /// `target` has one velocity per body.
     pub fn new(

@@ -59,7 +59,7 @@ pub struct RowForce {
 
 /// A condition on the velocities of two bodies: a force acts between them, along `sides`, so that
 /// `gap + h Σ jacobian · v` becomes zero, as far as the force stays within its bounds.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// What it is about.
     pub id: RowId,
@@ -88,7 +88,7 @@ pub struct Row {
 
 /// Friction of a contact. It acts against the velocity of the first body relative to the second one
 /// in the tangent plane.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     /// Unit normal of the tangent plane.
     pub normal: DVec3,
@@ -206,9 +206,9 @@ pub struct Bodies<'a> {
     pub free_of: &'a [Option<usize>],
 }
 
-/// The forces of rows whose ids are `before`, for rows of the same ids, in the order in which these
-/// come.
-pub fn carry(before: impl Iterator<Item = RowId>, forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
+/// Of each of `rows`, the index of the row of the same id among those whose ids are `before`, in the
+/// order in which these come.
+pub fn matches(before: impl Iterator<Item = RowId> + Clone, rows: &[Row]) -> Vec<Option<usize>> {
     fn ordered(ids: impl Iterator<Item = RowId>) -> Vec<(RowId, usize)> {
         let pair = |(id, _): &(RowId, usize)| match id {
             RowId::Contact(pair, _) => Ok(*pair),
@@ -216,14 +216,21 @@ pub fn carry(before: impl Iterator<Item = RowId>, forces: &[RowForce], rows: &[R
         };
         sort_runs(ids.zip(0..).collect(), pair, |(id, _)| *id)
     }
-    let mut carried = vec![RowForce::default(); rows.len()];
+    // Mostly, nothing has come or gone.
+    if rows.iter().map(|row| row.id).eq(before.clone()) {
+        return (0..rows.len()).map(Some).collect();
+    }
+    let mut of_rows = vec![None; rows.len()];
     let before = ordered(before);
     let mut from = before.iter().peekable();
     for (id, k) in ordered(rows.iter().map(|row| row.id)) {
         while from.next_if(|(other, _)| *other < id).is_some() {}
-        if let Some((_, other)) = from.next_if(|(other, _)| *other == id) {
-            carried[k] = forces[*other];
-        }
+        of_rows[k] = from.next_if(|(other, _)| *other == id).map(|(_, other)| *other);
     }
-    carried
+    of_rows
+}
+
+/// The forces of rows of which `of_rows` are the indices among `forces`.
+pub fn carry(of_rows: &[Option<usize>], forces: &[RowForce]) -> Vec<RowForce> {
+    of_rows.iter().map(|k| k.map_or(RowForce::default(), |k| forces[k])).collect()
 }

@@ -6,9 +6,10 @@ use super::Newton;
 use super::geometric::Motion;
 use super::integrate::unpack;
 use super::islands::{Island, islands};
+use super::kept::Known;
 use super::line::Placed;
 use super::problem::{Minimum, Problem};
-use super::rows::{Resistance, Row, RowForce, carry};
+use super::rows::{Resistance, Row, RowForce, carry, matches};
 use super::step::Step;
 use crate::Residual;
 
@@ -29,12 +30,18 @@ pub struct Guess<'a> {
     pub velocities: &'a [Vector6<f64>],
     /// What each row does; `None` where nothing is known.
     pub forces: Option<&'a [RowForce]>,
+    /// What is kept of the last step, where it may be the solution.
+    pub known: Option<&'a Known<'a>>,
 }
 
 impl Guess<'_> {
     /// The guess for an island, where it is known to be the solution: its bodies rest, and its rows
-    /// are as before.
+    /// are as before; or its problem is that of the last step.
     fn solved(&self, step: &Step, island: &Island, rows: &[Row], gap: Gap) -> Option<Minimum> {
+        let known = self.known.and_then(|known| known.solution(step, island, rows, gap));
+        if let Some((velocity, forces)) = known {
+            return Some(Minimum::known(velocity, forces));
+        }
         let mut of_island = island.rows.iter().map(|&k| &rows[k]);
         let is_solved = match gap {
             Gap::Position => island.bodies.iter().all(|&k| step.resting[k]),
@@ -44,13 +51,8 @@ impl Guess<'_> {
             }
         };
         let forces = self.forces.filter(|_| is_solved)?;
-        Some(Minimum {
-            velocity: island.bodies.iter().map(|&k| self.velocities[k]).collect(),
-            forces: island.rows.iter().map(|&k| forces[k]).collect(),
-            iterations: 0,
-            converged: true,
-            residual: Residual::default(),
-        })
+        let velocity = island.bodies.iter().map(|&k| self.velocities[k]).collect();
+        Some(Minimum::known(velocity, island.rows.iter().map(|&k| forces[k]).collect()))
     }
 }
 
@@ -176,10 +178,10 @@ impl Newton {
 
 /// The forces of the rows `before` for `rows`.
 pub fn carry_rows(before: &[Row], forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
-    carry(before.iter().map(|row| row.id), forces, rows)
+    carry(&matches(before.iter().map(|row| row.id), rows), forces)
 }
 
 /// A minimisation that starts from the last one.
 pub fn from_last<'a>(velocities: &'a [Vector6<f64>], forces: &'a [RowForce]) -> Guess<'a> {
-    Guess { velocities, forces: Some(forces) }
+    Guess { velocities, forces: Some(forces), known: None }
 }

@@ -13,6 +13,7 @@ use super::geometric::{Loads, Motion, Start};
 use super::integrate::{unpack, velocity};
 use super::islands::spread;
 use super::joints::{joint_rows, predict};
+use super::kept::Known;
 use super::rows::{Resistance, Row, RowForce};
 use super::solve::{Gap, Guess, carry_rows, from_last};
 use super::step::Step;
@@ -82,11 +83,12 @@ impl Newton {
                 row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
             }
             let verdict = step.report.verdict();
-            let kept = self.kept.of(&first);
+            let known = self.kept.of(&first, start);
+            let kept = known.as_ref().map(Known::forces);
             let of_kept =
                 kept.as_deref().and_then(|kept| plain.stiffened(&loads(&first, kept), &found_at, &from));
             let motion = of_kept.as_ref().unwrap_or(&plain);
-            let guess = Guess { velocities: start, forces: kept.as_deref() };
+            let guess = Guess { velocities: start, forces: kept.as_deref(), known: known.as_ref() };
             let (mut velocities, mut forces) = self.solve(step, motion, &first, Gap::Position, guess);
             let stiffened = plain.stiffened(&loads(&first, &forces), &found_at, &from);
             let again = stiffened.as_ref().unwrap_or(&plain);
@@ -190,20 +192,23 @@ impl Newton {
         let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
         self.close_joints(step, &mut solved, of_joints, &from);
         let Iterate { rows, velocities, forces, plain, .. } = &solved;
-        let relaxed = rows
-            .iter()
-            .any(|row| row.relaxed_gap != row.gap)
-            .then(|| self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)));
+        let differs = rows.iter().any(|row| row.relaxed_gap != row.gap);
+        let relaxed = differs.then(|| {
+            let known = self.kept.of(rows, start);
+            let guess = Guess { known: known.as_ref(), ..from_last(velocities, forces) };
+            self.solve(step, solved.motion(), rows, Gap::Relaxed, guess)
+        });
         // Without corrections of poses, both are the same.
         let (carried, carrying) = relaxed.as_ref().map_or((velocities, forces), |(v, f)| (v, f));
         if far.closes(velocities, step.h) || far.closes(carried, step.h) {
             return Ok(None);
         }
         let reactions = self.reactions(rows, carrying, of_joints);
-        let carried = step.ended(plain, velocities, carried);
+        let ended = step.ended(plain, velocities, carried);
+        let (carried, carrying) = (carried.clone(), carrying.clone());
         let Iterate { rows, velocities, forces, .. } = solved;
-        self.kept.keep(&rows, forces);
-        Ok(Some(Solved { velocities, carried, forces: reactions }))
+        self.kept.keep(step, start, [&velocities, &carried], rows, [forces, carrying]);
+        Ok(Some(Solved { velocities, carried: ended, forces: reactions }))
     }
 
     /// For each free body a bound of the way between the points that these velocities move in a step,

@@ -22,6 +22,7 @@ mod screw;
 mod scripts;
 mod separation;
 mod sleep;
+mod still;
 mod support;
 mod warnings;
 mod worlds;
