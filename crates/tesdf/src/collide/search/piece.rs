@@ -438,7 +438,13 @@ impl Looks<'_> {
     ) -> Option<[f64; 3]> {
         let hair = self.hair();
         let heights = piece.corners.map(|c| normal.dot(triangle.corners[0] - c));
-        let points: [DVec3; 3] = std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * normal);
+        let mut points: [DVec3; 3] =
+            std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * normal);
+        let [a, b, c] = points;
+        // A piece that looks to the other side than the face goes around the other way.
+        if (b - a).cross(c - a).dot(normal) < 0.0 {
+            points.swap(1, 2);
+        }
         let points = &points[..piece.count];
         let mut is_clear = normal != DVec3::ZERO;
         asset.near_polygon(points, normal, hair, &mut |face| {
