@@ -13,7 +13,7 @@ use tesdf::collide::{
     CollideOptions, Contacts, ContactsPer, Instance, Mode, Placement, Pose, Scene, Shape, detect,
 };
 use tesdf::geometry::Triangle;
-use tesdf::glam::DVec3;
+use tesdf::glam::{DQuat, DVec3};
 
 /// A sample of a face may be deeper than the reported contact by at most this fraction of the
 /// diagonal.
@@ -161,6 +161,72 @@ fn distances_are_within_the_tolerance_of_certified_bounds() {
         }
     }
     assert!(certain > 100 && open < certain / 10, "{certain} faces certified, {open} left open");
+}
+
+/// Compares the least distance of each face with that of its parts in the cells, which another
+/// search finds. Returns the number of faces inside that were compared.
+fn faces_have_the_depth_of_their_cells(bodies: &[Placed; 2]) -> usize {
+    let found = |per| {
+        let found = detect(&scene(bodies), &CollideOptions::with_mode(Mode::exact().per(per)));
+        let found = found.expect("a good scene");
+        assert_eq!(found.statistics.unconverged, 0, "{per:?}: of {}", found.len());
+        found
+    };
+    let (of_cells, of_faces) = (found(ContactsPer::Cell), found(ContactsPer::Face));
+    let mut compared = 0;
+    for (a, b) in [(0, 1), (1, 0)] {
+        let (surface, field) = (&bodies[a], &bodies[b]);
+        let tolerance = 2.0 * TOLERANCE * field.diagonal();
+        let [cells, faces] = [&of_cells, &of_faces].map(|found| least_by_face(found, a as u32, b as u32));
+        for (face, least) in cells.into_iter().filter(|(_, least)| *least < -tolerance) {
+            let corners = surface.body.face(face, surface.at);
+            // A contact at a vertex may be reported for another of its faces.
+            if corners.iter().any(|p| field.distance_by_tree(*p) <= least + tolerance) {
+                continue;
+            }
+            let of_face = faces.get(&face).copied();
+            assert!(
+                of_face.is_some_and(|d| (d - least).abs() <= tolerance),
+                "face {face} of {a}: {of_face:?}, in cells {least}"
+            );
+            compared += 1;
+        }
+    }
+    compared
+}
+
+#[test]
+fn the_depth_of_a_face_is_that_of_its_cells() {
+    let mut random = Random(7);
+    let mut compared = 0;
+    // Threads that cut into each other: beyond the plane of a flank lies the next one.
+    for k in 0..4 {
+        let [bolt, nut] = bolt_and_nut(&mut random, 1e-4 * f64::from(k));
+        let turn = DQuat::from_axis_angle(random.direction(), 5e-3 * f64::from(k));
+        compared += faces_have_the_depth_of_their_cells(&[
+            bolt,
+            nut.moved(Pose::new(DVec3::ZERO, turn).expect("a pose")),
+        ]);
+    }
+    assert!(compared > 500, "{compared} faces of threads");
+    // Ties: each deepest point has several nearest faces, and of parallel sides whole lines are
+    // equally deep.
+    let place = |name: &str, turn: DQuat, shift: DVec3| {
+        let at = Placed::around(name, turn, 1.0, DVec3::ZERO);
+        let size = at.diagonal();
+        at.moved(Pose::at(size * shift))
+    };
+    let mut tied = 0;
+    for names in [["beam", "l_bracket"], ["cube", "torus_quads"], ["l_bracket", "cube"], ["menger_2", "beam"]]
+    {
+        for turn in [DQuat::IDENTITY, DQuat::from_rotation_x(std::f64::consts::FRAC_PI_4)] {
+            for shift in [DVec3::ZERO, DVec3::new(0.0, 0.0, 0.1), DVec3::new(0.05, 1e-9, 0.0)] {
+                let bodies = [place(names[0], DQuat::IDENTITY, DVec3::ZERO), place(names[1], turn, shift)];
+                tied += faces_have_the_depth_of_their_cells(&bodies);
+            }
+        }
+    }
+    assert!(tied > 100, "{tied} faces with ties");
 }
 
 /// Signed distance of a box, by its formula.

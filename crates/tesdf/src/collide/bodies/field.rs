@@ -8,7 +8,7 @@ use crate::asset::layout::Label;
 use crate::base::Side;
 use crate::collide::report::contact::FeatureB;
 use crate::collide::scene::field_value::FieldValue;
-use crate::collide::scene::pose::Placement;
+use crate::collide::scene::pose::{Placement, Pose};
 use crate::collide::scene::shape::Shape;
 use crate::collide::scene::simple::Simple;
 use crate::geometry::{Closest, Feature, GeneralizedWinding};
@@ -124,6 +124,11 @@ impl<'a> FieldBody<'a> {
             simple => Field::Simple(Simple::from(simple)),
         };
         Self { field, signs: Signs::Kept, placement }
+    }
+
+    /// A field whose frame is that of the world.
+    pub fn in_own_frame(field: Field<'a>) -> Self {
+        Self { field, signs: Signs::Kept, placement: Placement { pose: Pose::IDENTITY, scale: 1.0 } }
     }
 
     /// The distance to the faces without a sign, where the sign jumps. Any other field is the same.
@@ -350,7 +355,7 @@ impl CellField<'_> {
         match *self {
             Self::Mesh { asset, place, faces } => asset.find(p, place, faces, precision).into(),
             Self::Whole(around) => {
-                let known = around.found(p).filter(|_| precision == Precision::F64);
+                let known = if precision == Precision::F64 { around.found(p) } else { None };
                 let asset = around.asset;
                 known.unwrap_or_else(|| asset.found_at(p, asset.locate(p), precision)).into()
             }

@@ -3,6 +3,7 @@ use glam::DVec3;
 
 use super::Lowest;
 use super::branch_and_bound::{self, branch_and_bound};
+use super::deepest::{deepest, has_bounds_by_planes};
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
@@ -26,7 +27,7 @@ const SUNK: f64 = 1.0 / 16.0;
 /// when it is above `reach`.
 ///
 /// Outside the solid it is the least distance between the polygon and a face, in closed form.
-/// Inside, the depth is a minimum of convex functions, and branch and bound finds its maximum. It
+/// Inside, the depth is a minimum of convex functions, and a best-first search finds its maximum. It
 /// uses that the field is 1-Lipschitz, and that the distance to one face is convex, so over a
 /// triangle it is at most its greatest value at a corner.
 ///
@@ -51,7 +52,7 @@ pub fn lowest(
     }
     let none = Faces::default();
     let Some((asset, place, faces)) = cell.mesh(&none) else {
-        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
+        return Some(lowest_inside(cell, polygon, normal, (tolerance, reach), precision));
     };
     // No point of the surface is nearer to the centre than the first distance.
     let clear = radius + ROUNDING;
@@ -63,7 +64,7 @@ pub fn lowest(
     };
     let is_sunk = |depth: f64| matches!(cell, CellField::Whole(_)) && depth > SUNK * radius;
     if inside || is_sunk(-first.distance) {
-        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
+        return Some(lowest_inside(cell, polygon, normal, (tolerance, reach), precision));
     }
     if !crossing && reach < 0.0 {
         return None;
@@ -77,7 +78,7 @@ pub fn lowest(
     if crossing && distance <= CLEAR {
         let depth = -polygon.points().map(|p| cell.rough(p).0).fold(f64::INFINITY, f64::min);
         if is_sunk(depth) {
-            return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
+            return Some(lowest_inside(cell, polygon, normal, (tolerance, reach), precision));
         }
         if depth > ROUNDING || !query.only_touches(cell, distance, point) {
             return query.lowest_of_parts(cell, precision);
@@ -89,9 +90,26 @@ pub fn lowest(
         _ => cell.value(point, Precision::F64).distance < 0.0,
     };
     if crossing && distance > CLEAR && is_inside() {
-        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
+        return Some(lowest_inside(cell, polygon, normal, (tolerance, reach), precision));
     }
     (distance <= reach).then_some(Lowest { point, converged: true, face })
+}
+
+/// The least signed distance over a polygon of which a part may be inside, within a tolerance, if
+/// it is at most `reach`.
+fn lowest_inside(
+    cell: &CellField,
+    polygon: &Polygon,
+    normal: DVec3,
+    (tolerance, reach): (f64, f64),
+    precision: Precision,
+) -> Lowest {
+    match cell {
+        CellField::Whole(Surroundings { asset, .. }) if has_bounds_by_planes(asset) => {
+            deepest(asset, polygon, normal, tolerance, reach)
+        }
+        _ => branch_and_bound(cell, polygon, tolerance, reach, precision),
+    }
 }
 
 /// Whether the value at a point of the polygon, `least`, has the least signed distance of the
@@ -273,11 +291,18 @@ impl<'a> Query<'a> {
                 continue;
             }
             let value = cell.value(center, Precision::F64);
-            let (distance, point, _) = part.nearest_to_faces(value.position);
-            let found = if value.distance > CLEAR || part.only_touches(cell, distance, point) {
-                (distance, point)
+            let touches = || {
+                let (distance, point, _) = part.nearest_to_faces(value.position);
+                let is_outside = value.distance > CLEAR || part.only_touches(cell, distance, point);
+                is_outside.then_some((distance, point))
+            };
+            // A part whose centre is deeper than `only_touches` moves it stays inside.
+            let is_inside = value.distance < -2.0 * CLEAR;
+            let found = if let Some(found) = (!is_inside).then(touches).flatten() {
+                found
             } else {
-                let lowest = branch_and_bound(cell, &polygon, self.tolerance, reach, precision);
+                let limits = (self.tolerance, reach);
+                let lowest = lowest_inside(cell, &polygon, self.normal, limits, precision);
                 converged &= lowest.converged;
                 (cell.value(lowest.point, Precision::F64).distance, lowest.point)
             };

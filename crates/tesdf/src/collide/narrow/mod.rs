@@ -1,5 +1,6 @@
 //! Narrow phase: the least signed distance over a node or a clipped polygon, and its point.
 mod branch_and_bound;
+mod deepest;
 mod exact;
 pub mod extremes;
 mod frank_wolfe;

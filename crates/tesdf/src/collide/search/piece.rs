@@ -105,17 +105,14 @@ const CLEAR: f64 = 1e-9;
 impl Piece {
     /// A whole face.
     pub fn new(face: u32, part: &Part) -> Self {
-        let points = part.points();
+        Self::of_points(face, part.points(), part.normal, part.radius)
+    }
+
+    /// One to three points of a face that the surface lies within `radius` of.
+    pub fn of_points(face: u32, points: &[DVec3], normal: DVec3, radius: f64) -> Self {
         let corners = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
-        Self {
-            face,
-            radius: part.radius,
-            corners,
-            count: points.len(),
-            normal: part.normal,
-            is_inside: false,
-            bounds: DepthBounds::NONE,
-        }
+        let bounds = DepthBounds::NONE;
+        Self { face, radius, corners, count: points.len(), normal, is_inside: false, bounds }
     }
 
     fn points(&self) -> &[DVec3] {
@@ -225,6 +222,11 @@ fn chord(face: u32, triangle: &Triangle, corners: [DVec3; 3]) -> Bound {
 }
 
 impl Looks<'_> {
+    /// A first look at a corner of a piece.
+    pub fn corner(&mut self, piece: &Piece, corner: DVec3) {
+        self.value(piece, corner, false);
+    }
+
     /// Whether nothing as low as this is wanted.
     pub fn is_closed(&self, bound: f64) -> bool {
         // A bound that is not a number is closed, too.
@@ -438,8 +440,7 @@ impl Looks<'_> {
     ) -> Option<[f64; 3]> {
         let hair = self.hair();
         let heights = piece.corners.map(|c| normal.dot(triangle.corners[0] - c));
-        let mut points: [DVec3; 3] =
-            std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * normal);
+        let mut points: [DVec3; 3] = std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * normal);
         let [a, b, c] = points;
         // A piece that looks to the other side than the face goes around the other way.
         if (b - a).cross(c - a).dot(normal) < 0.0 {
