@@ -10,7 +10,8 @@ use crate::TeSdf;
 use crate::collide::bodies::field::{CellField, ROUNDING};
 use crate::collide::bodies::polygon::{MAX_VERTICES, Polygon};
 use crate::collide::scene::field_value::FieldValue;
-use crate::collide::search::greatest_minimum::{self, CORNERS, summit};
+use crate::collide::search::depth_bounds::{Bound, DepthBounds, Kind};
+use crate::collide::search::greatest_minimum::{summit, value};
 use crate::collide::search::longest_edge::longest_edge;
 use crate::collide::search::queue::Queue;
 use crate::geometry::Triangle;
@@ -256,21 +257,20 @@ impl<'a> Branches<'a> {
                     }
                 }
                 if self.is_open(bound) {
-                    let faces = corners.map(|c| c.value.position);
-                    let mut cuts = Cuts::default();
-                    cuts.add(value.position, near, CORNERS[0]);
-                    for face in faces.into_iter().chain([self.best_face]) {
-                        if !cuts.holds(face) {
-                            cuts.add(face, distances(&triangle(face)), CORNERS[0]);
+                    let chord = |face, at| Bound { face, kind: Kind::Chord, at };
+                    let mut bounds = DepthBounds::NONE;
+                    bounds.add(chord(value.position, near));
+                    for face in corners.map(|c| c.value.position).into_iter().chain([self.best_face]) {
+                        if !bounds.holds(face) {
+                            bounds.add(chord(face, distances(&triangle(face))));
                         }
                     }
-                    let distances = |face| distances(&triangle(face));
-                    let (least, at) = self.bound_by_faces(&mut cuts, points, distances);
-                    bound = bound.max(least);
+                    let chord = |face| chord(face, distances(&triangle(face)));
+                    bound = bound.max(self.bound_by_faces(&mut bounds, points, chord));
                     // Where the sign jumps, the side of a part is to be told, too: the shorter it is in
                     // every direction, the sooner.
                     if self.is_open(bound) && !self.jumps {
-                        edge = cuts.curved_edge(asset, points, at, self.tolerance);
+                        edge = curved_edge(asset, &bounds, points, self.tolerance);
                     }
                 }
             }
@@ -291,29 +291,28 @@ impl<'a> Branches<'a> {
 
     /// Bounds the depth over a triangle by one face after the other: each is the nearest one to the
     /// place where the faces so far leave the greatest depth. Returns a lower bound of the signed
-    /// distance, and the barycentric coordinates of the last such place.
+    /// distance.
     fn bound_by_faces(
         &mut self,
-        cuts: &mut Cuts,
+        bounds: &mut DepthBounds,
         points: [DVec3; 3],
-        distances: impl Fn(u32) -> [f64; 3],
-    ) -> (f64, [f64; 3]) {
-        let (mut bound, mut place) = (f64::NEG_INFINITY, CORNERS[0]);
+        chord: impl Fn(u32) -> Bound,
+    ) -> f64 {
+        let mut bound = -bounds.greatest;
         for _ in 0..MAX_ADDED {
-            let (depth, at) = summit(&cuts.values);
-            place = at;
-            bound = bound.max(-depth);
             if !self.is_open(bound) {
                 break;
             }
             // Where the faces that matter are among these, this is the deepest point.
-            let found = self.value(at[0] * points[0] + at[1] * points[1] + at[2] * points[2]);
-            if !self.is_open(bound) || cuts.holds(found.position) {
+            let [u, v, w] = bounds.at;
+            let found = self.value(u * points[0] + v * points[1] + w * points[2]);
+            if !self.is_open(bound) || bounds.holds(found.position) {
                 break;
             }
-            cuts.add(found.position, distances(found.position), at);
+            bounds.add(chord(found.position));
+            bound = bound.max(-bounds.greatest);
         }
-        (bound, place)
+        bound
     }
 }
 
@@ -330,64 +329,29 @@ const SHALLOW: f64 = 4.0;
 /// linear.
 const BENT: f64 = 0.25;
 
-/// Number of faces that bound the depth over a triangle at a time. Three are equally near to its
-/// deepest point; more may be.
-const CUTS: usize = 6;
-
 /// Number of times that a face is added before a triangle is halved.
 const MAX_ADDED: usize = 16;
 
-/// Faces, and their distances from the corners of a triangle.
-#[derive(Default)]
-struct Cuts {
-    faces: ArrayVec<u32, CUTS>,
-    values: ArrayVec<[f64; 3], CUTS>,
-}
-
-impl Cuts {
-    fn holds(&self, face: u32) -> bool {
-        self.faces.contains(&face)
-    }
-
-    /// The edge of a triangle along which the distance to a face that bounds the depth at `at`
-    /// bends most: there the bound, which is linear between the corners, lies highest above it.
-    /// `None` where it bends nowhere by much.
-    ///
-    /// The deepest points of parallel prisms are a whole line. Halves of the longest edge would be
-    /// as short along this line as they have to be across it.
-    fn curved_edge(&self, asset: &TeSdf, points: [DVec3; 3], at: [f64; 3], tolerance: f64) -> Option<usize> {
-        let here = |values: &[f64; 3]| greatest_minimum::value(values, at);
-        let depth = self.values.iter().map(here).fold(f64::INFINITY, f64::min);
-        let mut most = (BENT * tolerance, None);
-        for (&face, values) in self.faces.iter().zip(&self.values) {
-            if here(values) > depth + tolerance {
-                continue;
-            }
-            let triangle = asset.local_triangle(face as usize);
-            for k in 0..3 {
-                let l = (k + 1) % 3;
-                let middle = triangle.closest(0.5 * (points[k] + points[l])).distance;
-                let bend = 0.5 * (values[k] + values[l]) - middle;
-                if bend > most.0 {
-                    most = (bend, Some(k));
-                }
+/// The edge of a triangle along which the distance to a face that bounds the depth where it can be
+/// greatest bends most: there the bound, which is linear between the corners, lies highest above it.
+/// `None` where it bends nowhere by much.
+///
+/// The deepest points of parallel prisms are a whole line. Halves of the longest edge would be as
+/// short along this line as they have to be across it.
+fn curved_edge(asset: &TeSdf, bounds: &DepthBounds, points: [DVec3; 3], tolerance: f64) -> Option<usize> {
+    let mut most = (BENT * tolerance, None);
+    for bound in bounds.iter().filter(|b| value(&b.at, bounds.at) <= bounds.greatest + tolerance) {
+        let triangle = asset.local_triangle(bound.face as usize);
+        for k in 0..3 {
+            let l = (k + 1) % 3;
+            let middle = triangle.closest(0.5 * (points[k] + points[l])).distance;
+            let bend = 0.5 * (bound.at[k] + bound.at[l]) - middle;
+            if bend > most.0 {
+                most = (bend, Some(k));
             }
         }
-        most.1
     }
-
-    /// Adds a face. If there are too many, it takes the place of the one that is farthest from the
-    /// point of barycentric coordinates `at`.
-    fn add(&mut self, face: u32, distances: [f64; 3], at: [f64; 3]) {
-        if self.faces.is_full() {
-            let far = |k: &usize| greatest_minimum::value(&self.values[*k], at);
-            let Some(farthest) = (0..CUTS).max_by(|k, l| far(k).total_cmp(&far(l))) else { return };
-            (self.faces[farthest], self.values[farthest]) = (face, distances);
-        } else {
-            self.faces.push(face);
-            self.values.push(distances);
-        }
-    }
+    most.1
 }
 
 /// Upper bound, over a triangle, of the distance to two coplanar faces that share an edge; infinite

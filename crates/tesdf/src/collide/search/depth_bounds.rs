@@ -55,6 +55,11 @@ impl DepthBounds {
         self.bounds.iter().find(|b| b.face == face).map(|b| (*b, value(&b.at, self.at)))
     }
 
+    /// Whether there is a bound of a face.
+    pub fn holds(&self, face: u32) -> bool {
+        self.bounds.iter().any(|b| b.face == face)
+    }
+
     /// Adds a bound. It replaces that of the same face, or the one that is farthest from mattering
     /// where the least bound is greatest, when there is no more room.
     pub fn add(&mut self, bound: Bound) {
