@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use tesdf::collide::{Pose, Velocity};
 use tesdf::glam::{DMat3, DQuat, DVec3};
 use tesdf_sim::newton::Newton;
-use tesdf_sim::{Drive, Dynamics, Mass, MassProperties, Motor, State, System};
+use tesdf_sim::{Drive, Dynamics, Mass, MassProperties, Motor, State, System, World};
 
 use crate::errors::{Error, argument, kind_of};
 use crate::poses::{self, of_pose, of_velocity};
@@ -60,16 +60,17 @@ pub fn motor(
     Ok(drive.map(|drive| Motor { drive, limit }))
 }
 
-/// Sets the mass of a free body. What is not given follows from the mass properties that it has.
+/// Sets the mass of a free body. What is not given follows from the mass properties in the scene.
 pub fn set_mass(
-    engine: &mut Newton,
+    world: &mut World,
     body: usize,
     mass: f64,
     center: Option<[f64; 3]>,
     inertia: Option<[f64; 6]>,
 ) -> Result<(), Error> {
-    let refused = |e: tesdf_sim::MassError| Error::Mass(engine.system().bodies()[body].name.clone(), e);
-    let scaled = match engine.system().bodies()[body].mass {
+    let name = world.engine().system().bodies()[body].name.clone();
+    let refused = |e: tesdf_sim::MassError| Error::Mass(name.clone(), e);
+    let scaled = match world.first_masses()[body] {
         Mass::Free(before) => before.with_mass(mass).map_err(refused)?,
         // The engine refuses it.
         Mass::Fixed | Mass::Kinematic => {
@@ -81,7 +82,7 @@ pub fn set_mass(
     });
     let center = center.map_or(scaled.center, DVec3::from_array);
     let properties = MassProperties::new(mass, center, inertia).map_err(refused)?;
-    engine.set_mass(body, properties).map_err(Error::Dynamics)
+    world.engine_mut().set_mass(body, properties).map_err(Error::Dynamics)
 }
 
 /// Sets what is given of the state of a body.

@@ -485,9 +485,9 @@ impl Simulation {
     /// Sets the mass of a free body, kg, given by its name or number, from the next step on. The
     /// body wakes.
     ///
-    /// - center_of_mass: [3] in the body's frame, m. None: it stays.
+    /// - center_of_mass: [3] in the body's frame, m. None: that in the scene.
     /// - inertia: [6] xx yy zz xy xz yz about the centre of mass, along the axes of the body's
-    ///   frame, kg m². None: that of the body, in proportion to the mass.
+    ///   frame, kg m². None: that in the scene, in proportion to the mass.
     ///
     /// A reset leaves it as it is; restore brings back that of the snapshot.
     ///
@@ -502,7 +502,7 @@ impl Simulation {
         inertia: Option<[f64; 6]>,
     ) -> PyResult<()> {
         let body = index_of("body", body, &self.bodies(py))?;
-        self.set(py, |engine| settings::set_mass(engine, body, mass, center_of_mass, inertia))
+        self.change(py, |r| settings::set_mass(&mut r.world, body, mass, center_of_mass, inertia))
     }
 
     /// Sets the coefficient of friction of a body, given by its name or number, from the next step

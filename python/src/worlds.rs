@@ -296,8 +296,8 @@ impl Worlds {
         let center = optional(center_of_mass.map(|any| columns::<3>("center_of_mass", any, rows)), rows)?;
         let inertia = optional(inertia.map(|any| columns::<6>("inertia", any, rows)), rows)?;
         let values: Vec<_> = mass.into_iter().zip(center.into_iter().zip(inertia)).collect();
-        self.set(py, chosen, values, |engine, ([mass], (center, inertia))| {
-            settings::set_mass(engine, body, mass, center, inertia)
+        self.change(py, chosen, values, |world, ([mass], (center, inertia))| {
+            settings::set_mass(world, body, mass, center, inertia)
         })
     }
 

@@ -204,6 +204,18 @@ def test_worlds_go_back_and_spread_from_one():
     assert worlds.steps.tolist() == [0, 30, 0, 0]
 
 
+def test_a_mass_does_not_depend_on_the_one_before():
+    once, twice = tesdf.Simulation(SCENE), tesdf.Simulation(SCENE)
+    for mass in (0.3, 1.7, 0.9):
+        twice.set_mass("door", mass, center_of_mass=[0, 0, mass], inertia=[1, 1, 1, 0, 0, 0])
+        twice.set_mass("door", mass)
+    once.set_mass("door", 0.9)
+    for simulation in (once, twice):
+        simulation.reset()
+        simulation.step(20)
+    assert same(shown(once), shown(twice))
+
+
 def test_a_reset_and_a_step_take_little_time():
     """Far above what they take, 2 and 15 us on a free processor: a thread that is started takes more."""
     simulation = tesdf.Simulation(SCENE, history=False, threads=1)

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::newton::{Newton, Snapshot};
 use crate::scene_file::SceneFile;
 use crate::script::Scripts;
-use crate::{Dynamics, DynamicsError, Moment, Motor, Run, SimulateError, State, StepReport};
+use crate::{Dynamics, DynamicsError, Mass, Moment, Motor, Run, SimulateError, State, StepReport};
 
 /// The bodies of a scene in motion: an engine, the scripts that drive it, and its time. A clone shares
 /// meshes and scripts.
@@ -21,6 +21,7 @@ pub struct World {
 /// How a world begins, and what drives it.
 struct Beginning {
     states: Vec<State>,
+    masses: Vec<Mass>,
     motors: Vec<Option<Motor>>,
     scripts: Scripts,
     /// s
@@ -43,6 +44,7 @@ impl World {
         let system = engine.system();
         let beginning = Beginning {
             states: system.states().to_vec(),
+            masses: system.bodies().iter().map(|body| body.mass).collect(),
             motors: system.joints().iter().map(|joint| joint.motor).collect(),
             scripts: Scripts::new(&scene.scripts, system).map_err(SimulateError::Script)?,
             time_step: scene.time_step,
@@ -78,6 +80,11 @@ impl World {
     /// The states at the beginning.
     pub fn first_states(&self) -> &[State] {
         &self.beginning.states
+    }
+
+    /// The masses at the beginning. One that is scaled from these does not depend on those set before.
+    pub fn first_masses(&self) -> &[Mass] {
+        &self.beginning.masses
     }
 
     /// Makes a step.

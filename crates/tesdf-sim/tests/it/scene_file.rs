@@ -1,7 +1,9 @@
 //! Tests of scene files, their error messages, and run files.
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
+use tesdf::collide::Shape;
 use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh, write};
@@ -423,6 +425,26 @@ fn a_mesh_of_a_thousand_bodies_is_loaded_once() {
     let shape = |body: &tesdf_sim::Body| system.scene().instance(body.instance).unwrap().shape;
     assert_eq!(system.bodies().len(), 1000);
     assert!(system.bodies().iter().all(|body| shape(body) == shape(&system.bodies()[0])));
+}
+
+#[test]
+fn an_asset_may_be_in_no_file() {
+    let scene = |geometry: &str| {
+        let bodies =
+            ["one", "two"].map(|name| format!("[[bodies]]\nname = \"{name}\"\n{geometry}\nmass = 1\n"));
+        let text = format!("time_step = 1e-3\nduration = 1\n{}", bodies.concat());
+        LoadedScene::parse(text, "scene.toml").unwrap()
+    };
+    let solid = SolidMesh::new(cuboid(DVec3::ZERO, DVec3::ONE)).unwrap();
+    let asset = Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid).unwrap());
+    let mut loaded = scene("asset = \"in memory\"");
+    assert!(loaded.system().unwrap_err().to_string().contains("in memory"));
+    loaded.memory.insert("in memory".into(), Arc::clone(&asset));
+    let system = loaded.system().unwrap();
+    let shapes: Vec<_> = system.scene().shapes().collect();
+    assert!(matches!(&shapes[..], [(_, Shape::Mesh(shared))] if Arc::ptr_eq(shared, &asset)));
+    let Mass::Free(mass) = system.bodies()[1].mass else { panic!() };
+    assert!((mass.center - DVec3::splat(0.5)).length() < 1e-12);
 }
 
 #[test]
