@@ -41,6 +41,7 @@ in_release() {
         step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt &&
         step "MJWarp example" in_environment release $tests/unoptimised_kernels.py examples/python/mujoco_warp_nuts_on_bolts.py &&
         step "Ray example" in_environment release examples/python/ray_encode.py &&
+        step "Ray example" in_environment release examples/python/ray_worlds.py &&
         # CUDA's replacement is for these tests only: Warp would take it, too.
         LD_LIBRARY_PATH=$cuda_on_cpu step "MJWarp with a device" in_environment release -m pytest $tests/test_mujoco_warp_device.py &&
         LD_LIBRARY_PATH=$cuda_on_cpu step "Vulkan and CUDA" in_environment release -m pytest python/tests/test_device.py
