@@ -11,8 +11,8 @@ use tesdf::collide::Pose;
 use super::Newton;
 use super::geometric::{ARM_TURN, Loads, Motion, Start};
 use super::joints::predict;
-use super::rows::{Row, RowForce};
-use super::solve::{Gap, from_last};
+use super::rows::{Gap, Row, RowForce};
+use super::solve::from_last;
 use super::step::Step;
 use crate::{Joint, Mass, State, System};
 

@@ -7,8 +7,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::islands::Island;
-use super::rows::{FreeBody, Row, RowForce, carry, matches};
-use super::solve::Gap;
+use super::rows::{FreeBody, Gap, Row, RowForce, carry, matches};
 use super::step::Step;
 
 /// Steps whose number is a multiple of this begin without forces.

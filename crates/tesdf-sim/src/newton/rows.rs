@@ -86,6 +86,15 @@ pub struct Row {
     pub friction: Option<Friction>,
 }
 
+/// The two gaps of a row.
+#[derive(Clone, Copy)]
+pub enum Gap {
+    /// Includes the correction that pushes penetrating bodies apart.
+    Position,
+    /// Without that correction.
+    Relaxed,
+}
+
 /// Friction of a contact. It acts against the velocity of the first body relative to the second one
 /// in the tangent plane.
 #[derive(Clone, Copy, Debug, PartialEq)]

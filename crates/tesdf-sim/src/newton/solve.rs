@@ -9,7 +9,7 @@ use super::islands::{Island, islands};
 use super::kept::Known;
 use super::line::Placed;
 use super::problem::{Minimum, Problem};
-use super::rows::{Resistance, Row, RowForce, carry, matches};
+use super::rows::{Gap, Resistance, Row, RowForce, carry, matches};
 use super::step::Step;
 use crate::Residual;
 
@@ -54,15 +54,6 @@ impl Guess<'_> {
         let velocity = island.bodies.iter().map(|&k| self.velocities[k]).collect();
         Some(Minimum::known(velocity, island.rows.iter().map(|&k| forces[k]).collect()))
     }
-}
-
-/// The two gaps of a row.
-#[derive(Clone, Copy)]
-pub enum Gap {
-    /// Includes the correction that pushes penetrating bodies apart.
-    Position,
-    /// Without that correction.
-    Relaxed,
 }
 
 impl Newton {
