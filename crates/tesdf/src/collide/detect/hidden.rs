@@ -163,7 +163,7 @@ struct Looks<'a> {
 
 /// A triangle that can be deep.
 #[derive(Clone, Copy)]
-struct Piece {
+struct DeepTriangle {
     corners: [DVec3; 3],
     /// The surface lies within this distance of the triangle.
     radius: f64,
@@ -200,7 +200,7 @@ impl Looks<'_> {
     }
 
     /// The faces that can be deep, by the balls around the nodes of the face tree.
-    fn faces(&mut self, surface: &SurfaceBody) -> Vec<Piece> {
+    fn faces(&mut self, surface: &SurfaceBody) -> Vec<DeepTriangle> {
         let mut faces = Vec::new();
         let mut level = vec![surface.whole()];
         while !level.is_empty() {
@@ -209,7 +209,7 @@ impl Looks<'_> {
                 match child {
                     TreeChild::Leaf(start, count) => {
                         let pieces =
-                            (start..start + count).map(|face| Piece::face(surface, face, self.field));
+                            (start..start + count).map(|face| DeepTriangle::face(surface, face, self.field));
                         faces.extend(pieces.filter(|piece| !self.is_fine(corner_reach(piece.corners))));
                     }
                     TreeChild::Node(node) => {
@@ -232,7 +232,7 @@ impl Looks<'_> {
     }
 
     /// Looks at each face, then at halves of those that can be deepest.
-    fn search(&mut self, faces: Vec<Piece>) {
+    fn search(&mut self, faces: Vec<DeepTriangle>) {
         let mut open = Queue::new();
         self.look(faces, &mut open);
         let mut fine = 0;
@@ -245,9 +245,9 @@ impl Looks<'_> {
                 break;
             }
             let before = self.looks;
-            let wave: Vec<Piece> =
+            let wave: Vec<DeepTriangle> =
                 std::iter::from_fn(|| open.pop()).take(WAVE).map(|(_, piece)| piece).collect();
-            self.look(wave.into_iter().flat_map(Piece::halves).collect(), &mut open);
+            self.look(wave.into_iter().flat_map(DeepTriangle::halves).collect(), &mut open);
             if !is_sure {
                 fine += self.looks - before;
             }
@@ -255,13 +255,14 @@ impl Looks<'_> {
     }
 
     /// Looks at triangles, and keeps those that can be deep enough.
-    fn look(&mut self, mut pieces: Vec<Piece>, open: &mut Queue<Piece>) {
+    fn look(&mut self, mut pieces: Vec<DeepTriangle>, open: &mut Queue<DeepTriangle>) {
         pieces.retain(|piece| Aabb::of(&piece.corners).grown(piece.radius).overlaps(self.core));
         let middles: Vec<(DVec3, f64)> = pieces.iter().map(|piece| middle(piece.corners)).collect();
         let points: Vec<DVec3> = middles.iter().map(|(middle, _)| *middle).collect();
         let values = self.values(&points);
-        let depth =
-            |(piece, value): (&Piece, &Option<FieldValue>)| Some(piece.radius - value.as_ref()?.distance);
+        let depth = |(piece, value): (&DeepTriangle, &Option<FieldValue>)| {
+            Some(piece.radius - value.as_ref()?.distance)
+        };
         self.deepest = pieces.iter().zip(&values).filter_map(depth).fold(self.deepest, f64::max);
         let wanted = self.wanted(HiddenOverlap::FINE);
         for ((piece, (middle, reach)), value) in pieces.into_iter().zip(middles).zip(values) {
@@ -285,7 +286,7 @@ impl Looks<'_> {
     }
 }
 
-impl Piece {
+impl DeepTriangle {
     fn face(surface: &SurfaceBody, face: u32, field: &FieldBody) -> Self {
         let (corners, radius) = surface.triangle(face, field);
         Self { corners, radius }

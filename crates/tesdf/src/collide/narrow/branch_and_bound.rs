@@ -29,7 +29,7 @@ pub struct Corner {
 }
 
 /// A part of the polygon that is still to be searched.
-pub struct Piece {
+pub struct BoundedTriangle {
     /// Lower bound of the signed distances on it.
     pub bound: f64,
     pub corners: [Corner; 3],
@@ -152,7 +152,12 @@ impl<'a> Branches<'a> {
     }
 
     /// Adds a triangle to a queue, as the item of its piece, if it can still improve the result.
-    pub fn push<T>(&mut self, corners: [Corner; 3], open: &mut Queue<T>, item: impl Fn(Piece) -> T) {
+    pub fn push<T>(
+        &mut self,
+        corners: [Corner; 3],
+        open: &mut Queue<T>,
+        item: impl Fn(BoundedTriangle) -> T,
+    ) {
         let piece = self.piece(corners);
         if self.is_open(piece.bound) {
             open.push(piece.bound, item(piece));
@@ -180,14 +185,14 @@ impl<'a> Branches<'a> {
     }
 
     /// Divides a triangle, along a side of the face nearest to its centre where that helps.
-    pub fn parts(&mut self, piece: &Piece) -> ArrayVec<[Corner; 3], 3> {
+    pub fn parts(&mut self, piece: &BoundedTriangle) -> ArrayVec<[Corner; 3], 3> {
         self.along_side(piece).unwrap_or_else(|| self.halves(piece).into_iter().collect())
     }
 
     /// Cuts a triangle near the surface where it leaves the space over the nearest face. The
     /// distance to the face is linear over it, and beside it bounds the depth badly: halves that
     /// reach across would be as short as the depth before they are closed.
-    fn along_side(&mut self, piece: &Piece) -> Option<ArrayVec<[Corner; 3], 3>> {
+    fn along_side(&mut self, piece: &BoundedTriangle) -> Option<ArrayVec<[Corner; 3], 3>> {
         let (CellField::Mesh { asset, .. } | CellField::Whole(&Surroundings { asset, .. })) = *self.cell
         else {
             return None;
@@ -223,7 +228,7 @@ impl<'a> Branches<'a> {
     }
 
     /// Halves an edge.
-    fn halves(&mut self, piece: &Piece) -> [[Corner; 3]; 2] {
+    fn halves(&mut self, piece: &BoundedTriangle) -> [[Corner; 3]; 2] {
         let mut corners = piece.corners;
         corners.rotate_left(piece.edge);
         let [a, b, c] = corners;
@@ -232,7 +237,7 @@ impl<'a> Branches<'a> {
     }
 
     /// A triangle, with its bound.
-    pub fn piece(&mut self, corners: [Corner; 3]) -> Piece {
+    pub fn piece(&mut self, corners: [Corner; 3]) -> BoundedTriangle {
         let points = corners.map(|c| c.point);
         let center = (points[0] + points[1] + points[2]) / 3.0;
         let value = self.value(center);
@@ -286,7 +291,7 @@ impl<'a> Branches<'a> {
                 }
             }
         }
-        Piece { bound, corners, center: value, edge: edge.unwrap_or_else(|| longest_edge(points)) }
+        BoundedTriangle { bound, corners, center: value, edge: edge.unwrap_or_else(|| longest_edge(points)) }
     }
 
     /// Bounds the depth over a triangle by one face after the other: each is the nearest one to the

@@ -9,7 +9,7 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::Lowest;
-use super::branch_and_bound::{Branches, Corner, Piece, branch_and_bound, triangles};
+use super::branch_and_bound::{BoundedTriangle, Branches, Corner, branch_and_bound, triangles};
 use super::exact::{CLEAR, Query};
 use crate::collide::bodies::field::{CellField, ROUNDING};
 use crate::collide::bodies::jump::{Side, side};
@@ -35,7 +35,7 @@ enum Known {
 
 /// A part of the polygon that is still to be searched.
 struct Open {
-    piece: Piece,
+    piece: BoundedTriangle,
     known: Known,
 }
 
@@ -150,7 +150,7 @@ impl Search<'_> {
             return;
         }
         // Also after a cut, so that parts get smaller.
-        let mut halve = |piece: &Piece, branches: &mut Branches| {
+        let mut halve = |piece: &BoundedTriangle, branches: &mut Branches| {
             for part in branches.parts(piece) {
                 branches.push(part, open, |piece| Open { piece, known });
             }
@@ -175,7 +175,7 @@ impl Search<'_> {
 
 /// The point of a part, its centre or a corner, that is farthest from the faces; `None` where all
 /// of them are on faces, up to rounding.
-fn off_faces(piece: &Piece, center: DVec3, branches: &Branches) -> Option<DVec3> {
+fn off_faces(piece: &BoundedTriangle, center: DVec3, branches: &Branches) -> Option<DVec3> {
     let corners = piece.corners.iter().map(|c| (c.value.distance.abs(), c.point));
     let first = (piece.center.distance.abs(), center);
     let (distance, at) = corners.fold(first, |best, next| if next.0 > best.0 { next } else { best });

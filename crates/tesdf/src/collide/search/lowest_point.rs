@@ -142,7 +142,7 @@ impl<'a> Search<'a> {
                 bound = batch.iter().map(|(bound, _)| *bound).fold(waiting, f64::min);
                 break;
             }
-            let found: Vec<Found> = match batch.len() {
+            let found: Vec<SearchedPart> = match batch.len() {
                 ..FEW => batch.into_iter().map(|(bound, open)| self.search(bound, open)).collect(),
                 _ => batch.into_par_iter().map(|(bound, open)| self.search(bound, open)).collect(),
             };
@@ -222,11 +222,11 @@ impl<'a> Search<'a> {
             }
         }
         let lowest = looks.lowest;
-        self.take(Found { order, lowest, open: Vec::new() });
+        self.take(SearchedPart { order, lowest, open: Vec::new() });
     }
 
     /// Searches a part.
-    fn search(&self, bound: f64, Open { order, item }: Open) -> Found {
+    fn search(&self, bound: f64, Open { order, item }: Open) -> SearchedPart {
         let Order { surface, field } = &self.orders[order];
         let (mut looks, mut found) = (self.looks(order), Vec::new());
         let bound = bound / field.unit();
@@ -251,10 +251,10 @@ impl<'a> Search<'a> {
             }
             Item::Piece(piece) => rest(looks.look(*piece, bound)),
         }
-        Found { order, lowest: looks.lowest, open: found }
+        SearchedPart { order, lowest: looks.lowest, open: found }
     }
 
-    fn take(&mut self, found: Found) {
+    fn take(&mut self, found: SearchedPart) {
         let unit = self.orders[found.order].field.unit();
         if let Some(lowest) = found.lowest.filter(|lowest| lowest.distance * unit < self.least()) {
             self.best = Some((lowest.distance * unit, found.order, lowest));
@@ -266,7 +266,7 @@ impl<'a> Search<'a> {
 }
 
 /// The result of the search of one part.
-struct Found {
+struct SearchedPart {
     order: usize,
     lowest: Option<Lowest>,
     /// What remains to be searched, with lower bounds in the field's frame.

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use crate::collide::search::queue::Queue;
-use crate::collide::time_of_impact::moving::{MovingBody, Part};
+use crate::collide::time_of_impact::moving::{MovingBody, MovingPart};
 use crate::collide::time_of_impact::parting::PairAt;
 
 /// What a search found.
@@ -42,7 +42,7 @@ pub struct Limits {
 /// A pair of parts. Its bound in the queue is the time up to which it is free.
 #[derive(Clone, Copy, Debug)]
 struct Open {
-    parts: [Part; 2],
+    parts: [MovingPart; 2],
     steps: u32,
 }
 
@@ -72,7 +72,7 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
         let pair = PairAt { bodies: [bodies[0].at(time), bodies[1].at(time)], radius, time };
         let places = [0, 1].map(|k| pair.bodies[k].part(parts[k]));
         let found = pair.parting(&places, limits.kept);
-        let are_faces = matches!(parts, [Part::Face(_), Part::Face(_)]);
+        let are_faces = matches!(parts, [MovingPart::Face(_), MovingPart::Face(_)]);
         if are_faces && found.distance <= limits.touching {
             return end(Outcome::Touch(time));
         }
@@ -91,8 +91,8 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
             return ControlFlow::Continue(());
         }
         let is_first = match parts {
-            [Part::Face(_), _] => false,
-            [_, Part::Face(_)] => true,
+            [MovingPart::Face(_), _] => false,
+            [_, MovingPart::Face(_)] => true,
             _ => places[0].reach() >= places[1].reach(),
         };
         let next = next.max(time);

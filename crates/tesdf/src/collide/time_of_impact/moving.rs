@@ -11,7 +11,7 @@ use crate::geometry::Triangle;
 
 /// A part of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum MovingPart {
     /// All of it.
     Whole,
     /// One of the two children of a node of the face tree.
@@ -67,24 +67,26 @@ impl<'a> MovingBody<'a> {
     }
 
     /// The whole surface.
-    pub fn whole(&self) -> Part {
-        if self.simple.len() == 1 { Part::Face(0) } else { Part::Whole }
+    pub fn whole(&self) -> MovingPart {
+        if self.simple.len() == 1 { MovingPart::Face(0) } else { MovingPart::Whole }
     }
 
     /// The parts of a part; none of a face.
-    pub fn parts_of(&self, part: Part) -> Vec<Part> {
+    pub fn parts_of(&self, part: MovingPart) -> Vec<MovingPart> {
         let node = match (self.shape, part) {
-            (_, Part::Face(_)) => return Vec::new(),
-            (Shape::Mesh(asset), Part::Half { node, side }) => {
+            (_, MovingPart::Face(_)) => return Vec::new(),
+            (Shape::Mesh(asset), MovingPart::Half { node, side }) => {
                 match TreeChild::decode(asset.tree_children[node as usize][usize::from(side)]) {
                     TreeChild::Node(node) => node,
-                    TreeChild::Leaf(start, count) => return (start..start + count).map(Part::Face).collect(),
+                    TreeChild::Leaf(start, count) => {
+                        return (start..start + count).map(MovingPart::Face).collect();
+                    }
                 }
             }
-            (Shape::Mesh(_), Part::Whole) => 0,
-            _ => return (0..self.simple.len() as u32).map(Part::Face).collect(),
+            (Shape::Mesh(_), MovingPart::Whole) => 0,
+            _ => return (0..self.simple.len() as u32).map(MovingPart::Face).collect(),
         };
-        vec![Part::Half { node, side: 0 }, Part::Half { node, side: 1 }]
+        vec![MovingPart::Half { node, side: 0 }, MovingPart::Half { node, side: 1 }]
     }
 
     /// The body at a time.
@@ -119,7 +121,7 @@ impl BodyAt<'_> {
     }
 
     /// A part at the time.
-    pub fn part(&self, part: Part) -> PartAt {
+    pub fn part(&self, part: MovingPart) -> PartAt {
         let of_face = |corners: &[DVec3]| {
             let mut points = [DVec3::ZERO; 3];
             for (k, point) in points.iter_mut().enumerate() {
@@ -134,7 +136,7 @@ impl BodyAt<'_> {
             PartAt { center: self.place(0.5 * (low + high)), extent: Extent::Box { halves } }
         };
         match (self.body.shape, part) {
-            (Shape::Mesh(asset), Part::Half { node, side }) => {
+            (Shape::Mesh(asset), MovingPart::Half { node, side }) => {
                 let (boxes, _) = asset.tree_boxes[node as usize].as_chunks::<6>();
                 let corner = |k: usize| {
                     let local = Vec3::from_slice(&boxes[usize::from(side)][k..]).as_dvec3();
@@ -142,12 +144,12 @@ impl BodyAt<'_> {
                 };
                 of_box(corner(0), corner(3))
             }
-            (Shape::Mesh(asset), Part::Face(face)) => of_face(&asset.face_corners(face as usize)),
-            (Shape::Mesh(asset), Part::Whole) => {
+            (Shape::Mesh(asset), MovingPart::Face(face)) => of_face(&asset.face_corners(face as usize)),
+            (Shape::Mesh(asset), MovingPart::Whole) => {
                 let bounds = asset.bounds();
                 of_box(bounds.min, bounds.max)
             }
-            (_, Part::Face(face)) => of_face(&self.body.simple[face as usize]),
+            (_, MovingPart::Face(face)) => of_face(&self.body.simple[face as usize]),
             (shape, _) => {
                 let bounds = shape.bounds();
                 of_box(bounds.min, bounds.max)

@@ -131,7 +131,7 @@ mod tests {
     use crate::collide::scene::motion::Motion;
     use crate::collide::scene::pose::{Placement, Pose};
     use crate::collide::scene::shape::Shape;
-    use crate::collide::time_of_impact::moving::{MovingBody, Part};
+    use crate::collide::time_of_impact::moving::{MovingBody, MovingPart};
     use glam::DQuat;
 
     fn motions() -> [Motion; 5] {
@@ -180,9 +180,9 @@ mod tests {
             let pair = |time: f64| PairAt { bodies: [a.at(time), b.at(time)], radius: 0.1, time };
             for (first, second) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
                 for parts in [
-                    [Part::Face(first), Part::Face(second)],
-                    [Part::Face(first), Part::Whole],
-                    [Part::Whole, Part::Whole],
+                    [MovingPart::Face(first), MovingPart::Face(second)],
+                    [MovingPart::Face(first), MovingPart::Whole],
+                    [MovingPart::Whole, MovingPart::Whole],
                 ] {
                     let start = 0.2;
                     let parting = |time: f64| {
@@ -191,7 +191,7 @@ mod tests {
                     };
                     let faces = |time: f64| {
                         let pair = pair(time);
-                        let places = [Part::Face(first), Part::Face(second)];
+                        let places = [MovingPart::Face(first), MovingPart::Face(second)];
                         let places = [0, 1].map(|k| pair.bodies[k].part(places[k]));
                         least_distance(&places).expect("faces").0 - pair.radius
                     };
