@@ -27,8 +27,8 @@
 //! S is the number of steps, B of bodies, J of joints, R of steps with recorded contacts, C of
 //! contacts, H of hidden overlaps, Q of steps with recorded forces, and F of contacts that push. The
 //! contacts and hidden overlaps of a step are those at its beginning, that is, at `poses[step]`. Its
-//! [forces](Forces) are means from `poses[step]` to `poses[step + 1]`. An overlap of two bodies is
-//! hidden when no contact shows it.
+//! [forces](crate::Forces) are means from `poses[step]` to `poses[step + 1]`. An overlap of two
+//! bodies is hidden when no contact shows it.
 //!
 //! A file without hidden overlaps has no `hidden.…` tensors, one without recorded forces no
 //! `forces.…` tensors.

@@ -13,7 +13,7 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static IS_WATCHED: AtomicBool = AtomicBool::new(false);
 
 /// Lets Ctrl-C, SIGTERM and SIGHUP end the command with exit code 2: at once where it does not look at
-/// the [flag](flag), and otherwise when it sees the flag, but within a second. The second signal ends it
+/// the [`flag`], and otherwise when it sees the flag, but within a second. The second signal ends it
 /// at once. A process that ignores SIGHUP, as those of `nohup` do, goes on ignoring it.
 ///
 /// # Errors
