@@ -315,7 +315,8 @@ fn encode_parts(
     repair: RepairMode,
     progress: &Progress,
 ) -> Result<TeSdf, ShapeFailure> {
-    let (mesh, inside) = joined(scene, &body.parts, repair).map_err(ShapeFailure::Reason)?;
+    let (mesh, inside) =
+        joined(&|file| scene.resolve(file), &body.parts, repair).map_err(ShapeFailure::Reason)?;
     let encode = || {
         let solid = SolidMesh::with_repair(mesh.clone(), inside, RepairMode::Never);
         let solid = solid.map_err(|e| ShapeFailure::Reason(format!("the parts together: {e}")))?.0;

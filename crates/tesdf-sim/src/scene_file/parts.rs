@@ -1,6 +1,6 @@
 //! Bodies of several meshes and shapes, which are encoded as one mesh.
 use std::f64::consts::{PI, TAU};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use tesdf::base::{Inside, SurfaceFaces};
@@ -9,7 +9,6 @@ use tesdf::glam::{DAffine3, DQuat, DVec3};
 use tesdf::mesh::{RepairMode, SolidMesh, TriangleMesh};
 
 use super::identity;
-use super::read::LoadedScene;
 
 /// Faces around the axis of a round part.
 const AROUND: usize = 64;
@@ -71,18 +70,18 @@ fn ones() -> [f64; 3] {
     [1.0; 3]
 }
 
-/// The mesh of the parts together, and what is inside of it.
+/// The mesh of the parts together, and what is inside of it. `resolve` gives the file of a path.
 ///
 /// # Errors
 /// The part at fault.
 pub(super) fn joined(
-    scene: &LoadedScene,
+    resolve: &dyn Fn(&Path) -> PathBuf,
     parts: &[PartSection],
     repair: RepairMode,
 ) -> Result<(TriangleMesh, Inside), String> {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for (k, part) in parts.iter().enumerate() {
-        let mesh = placed(scene, part, repair).map_err(|reason| format!("part {}: {reason}", k + 1))?;
+        let mesh = placed(resolve, part, repair).map_err(|reason| format!("part {}: {reason}", k + 1))?;
         let first = u32::try_from(vertices.len()).map_err(|_| "the parts have too many vertices")?;
         vertices.extend_from_slice(mesh.vertices());
         faces.extend(mesh.faces().iter().map(|face| face.map(|v| v.saturating_add(first))));
@@ -93,10 +92,14 @@ pub(super) fn joined(
     Ok((mesh, Inside { surface, ..Inside::default() }))
 }
 
-fn placed(scene: &LoadedScene, part: &PartSection, repair: RepairMode) -> Result<TriangleMesh, String> {
+fn placed(
+    resolve: &dyn Fn(&Path) -> PathBuf,
+    part: &PartSection,
+    repair: RepairMode,
+) -> Result<TriangleMesh, String> {
     let mesh = match (&part.mesh, &part.shape) {
         (Some(file), None) => {
-            let file = scene.resolve(file);
+            let file = resolve(file);
             let loaded = tesdf::mesh::read(&file).map_err(|e| e.in_file(&file).to_string())?;
             let solid = SolidMesh::with_repair(loaded.mesh, Inside::default(), repair);
             solid.map_err(|e| format!("{}: {e}", file.display()))?.0.into_mesh()
