@@ -129,6 +129,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
+    let output = output::open(&args.output, &args.inputs(), args.consent)?;
     if MeshFormat::of_path(&args.output).is_ok() {
         let output = args.output.display();
         return Err(Failure::new(format!(
@@ -136,7 +137,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         ))
         .hint(format!("-o {}", args.output.with_extension("tesdf").display())));
     }
-    let output = output::open(&args.output, &args.inputs(), args.consent)?;
     let start = Instant::now();
     args.cad.check(&args.mesh)?;
     let choices = args.choices.choices();

@@ -8,7 +8,8 @@ use crate::folder::{Folder, texts};
 fn reading(folder: &Folder, before: &str, args: &str) -> Child {
     let program = folder.command(&[]).get_program().to_owned();
     let child = Command::new("sh")
-        .args(["-c", &format!("{before} exec \"$0\" {args}")])
+        // The tests may themselves run where SIGHUP is ignored.
+        .args(["-c", &format!("exec env --default-signal=HUP sh -c \"{before} exec '$0' {args}\"")])
         .arg(program)
         .current_dir(folder.path(""))
         .stdout(Stdio::piped())
