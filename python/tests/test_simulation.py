@@ -297,6 +297,7 @@ def test_a_page_follows_the_steps(scene):
     frame = json.loads(lines[1].removeprefix("data: "))
     assert frame["step"] == 1 and len(frame["poses"]) == 7 * len(simulation.bodies)
     del simulation
-    with pytest.raises(OSError, match="refused"):
+    # Refused, or reset where the server ends just then.
+    with pytest.raises(OSError):
         for _ in range(100):
             urllib.request.urlopen(view.url, timeout=60).close()
