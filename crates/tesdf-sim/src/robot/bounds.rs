@@ -9,7 +9,7 @@ use super::{RobotError, parse, read};
 
 /// Greatest depth of elements, with those of included files: each takes some kilobytes of the stack,
 /// and threads may have 2 MiB.
-const MAX_DEPTH: usize = 200;
+const MAX_DEPTH: usize = 64;
 /// Greatest number of elements, each included file counted as often as it is included. The parser
 /// takes a time that grows with the square of the number of attached bodies.
 const MAX_ELEMENTS: u64 = 1 << 17;
@@ -139,18 +139,18 @@ mod tests {
     #[test]
     fn bodies_nested_too_deep_are_refused_and_others_fit_the_stack() {
         let told = refusal(&[("robot.xml", chain(3000))]);
-        assert!(told.contains("line 1: elements are nested 201 deep; expected at most 200"), "{told}");
+        assert!(told.contains("line 1: elements are nested 65 deep; expected at most 64"), "{told}");
         let half = |name: &str| {
-            let deep = "<body>".repeat(100);
-            format!("<mujoco>{deep}<include file='{name}'/>{}</mujoco>", "</body>".repeat(100))
+            let deep = "<body>".repeat(32);
+            format!("<mujoco>{deep}<include file='{name}'/>{}</mujoco>", "</body>".repeat(32))
         };
         let told = refusal(&[("robot.xml", half("other.xml")), ("other.xml", half("robot.xml"))]);
         assert!(told.contains("robot.xml includes itself"), "{told}");
-        let told = refusal(&[("robot.xml", half("other.xml")), ("other.xml", chain(100))]);
-        assert!(told.contains("nested 204 deep"), "{told}");
+        let told = refusal(&[("robot.xml", half("other.xml")), ("other.xml", chain(32))]);
+        assert!(told.contains("nested 68 deep"), "{told}");
         // The thread of a test has the 2 MiB that all threads but the first have.
-        let model = mjcf_rs::Model::from_str(&chain(198), ".").unwrap();
-        assert_eq!(model.bodies.len(), 199);
+        let model = mjcf_rs::Model::from_str(&chain(62), ".").unwrap();
+        assert_eq!(model.bodies.len(), 63);
     }
 
     #[test]
