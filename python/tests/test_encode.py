@@ -59,7 +59,7 @@ def test_threads_change_nothing(torus):
     ((TETRAHEDRON[0], np.zeros((0, 3), int)), tesdf.MeshError, "no faces"),
     (17, ValueError, "mesh: int; expected a path, a pair"),
     ("none.stl", FileNotFoundError, "cannot read none.stl"),
-    ("mesh.txt", tesdf.MeshError, "mesh.txt: the extension names no mesh format"),
+    (__file__, tesdf.MeshError, "test_encode.py: the extension names no mesh format"),
 ])
 def test_invalid_meshes_are_errors(mesh, error, text):
     for function in (tesdf.encode, tesdf.check, tesdf.repair):

@@ -121,7 +121,7 @@ def test_what_is_no_body_is_refused(cube):
         tesdf.Simulation(scene({"mesh": 3}))
     with pytest.raises(tesdf.NotSolidError):
         tesdf.Simulation(scene({"mesh": (cube[0], cube[1][:-1])}))
-    with pytest.raises(tesdf.SceneError, match="more than one of asset, mesh and shape"):
+    with pytest.raises(tesdf.SceneError, match="more than one of asset, mesh, shape and parts"):
         tesdf.Simulation(scene({"mesh": cube, "shape": {"sphere": {"radius": 1.0}}}))
     with pytest.raises(ValueError, match="shape: int; expected an Asset, Plane, Box, Sphere or Capsule, or a mesh"):
         tesdf.Scene().add_shape(3)
