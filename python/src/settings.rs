@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use tesdf::collide::{Pose, Velocity};
 use tesdf::glam::{DMat3, DQuat, DVec3};
 use tesdf_sim::newton::Newton;
-use tesdf_sim::{Drive, Dynamics, Mass, MassProperties, Motor, State, System, World};
+use tesdf_sim::{Drive, Dynamics, Mass, MassProperties, Motor, State, System, World, inertia_matrix};
 
 use crate::errors::{Error, argument, kind_of};
 use crate::poses::{self, of_pose, of_velocity};
@@ -77,9 +77,7 @@ pub fn set_mass(
             MassProperties { mass, center: DVec3::ZERO, inertia: DMat3::IDENTITY }
         }
     };
-    let inertia = inertia.map_or(scaled.inertia, |[xx, yy, zz, xy, xz, yz]| {
-        DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz))
-    });
+    let inertia = inertia.map_or(scaled.inertia, inertia_matrix);
     let center = center.map_or(scaled.center, DVec3::from_array);
     let properties = MassProperties::new(mass, center, inertia).map_err(refused)?;
     world.engine_mut().set_mass(body, properties).map_err(Error::Dynamics)

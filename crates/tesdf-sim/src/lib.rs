@@ -46,7 +46,7 @@ pub use dynamics::{Dynamics, Residual, StepReport};
 pub use error::DynamicsError;
 pub use forces::{ContactForce, Forces, JointForce};
 pub use joint::{Drive, Joint, JointKind, JointResistance, Motor};
-pub use mass::{MassError, MassProperties};
+pub use mass::{MassError, MassProperties, inertia_matrix};
 pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};
 pub use simulate::{Moment, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};
 pub use system::{Body, Mass, State, System, Wrench};

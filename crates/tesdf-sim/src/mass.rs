@@ -25,6 +25,11 @@ pub struct MassProperties {
     pub inertia: DMat3,
 }
 
+/// The symmetric matrix of moments and products of inertia in the order xx, yy, zz, xy, xz, yz.
+pub fn inertia_matrix([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> DMat3 {
+    DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz))
+}
+
 /// Why a body has no mass properties.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MassError {

@@ -13,7 +13,7 @@ use tesdf::collide::Pose;
 
 use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, Unread};
 use super::{RobotError, expand, parse, solids};
-use crate::MassProperties;
+use crate::{MassProperties, inertia_matrix};
 
 /// Density of geoms without one, kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -205,9 +205,7 @@ impl File<'_> {
             }
             let own = match inertial.inertia {
                 InertiaSpec::Diagonal(moments) => DMat3::from_diagonal(DVec3::from_array(moments)),
-                InertiaSpec::Full([xx, yy, zz, xy, xz, yz]) => {
-                    DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz))
-                }
+                InertiaSpec::Full(moments) => inertia_matrix(moments),
             };
             let pose = pose(&inertial.pose);
             let turn = DMat3::from_quat(pose.rotation);

@@ -11,7 +11,7 @@ use tesdf::collide::Pose;
 
 use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, Unread};
 use super::{Packages, RobotError, parse, read};
-use crate::MassProperties;
+use crate::{MassProperties, inertia_matrix};
 
 /// Reads the URDF file at `path`, whose meshes are found with `packages`.
 ///
@@ -210,9 +210,7 @@ impl<'a> File<'a> {
         for (moment, name) in moments.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
             *moment = self.numbers::<1>(node, name)?.unwrap_or_default()[0];
         }
-        let [xx, yy, zz, xy, xz, yz] = moments;
-        let inertia =
-            DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz));
+        let inertia = inertia_matrix(moments);
         let origin = self.origin(inertial)?;
         let turn = DMat3::from_quat(origin.rotation);
         let found = MassProperties::new(mass, origin.translation, turn * inertia * turn.transpose());

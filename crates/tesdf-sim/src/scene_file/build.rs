@@ -8,7 +8,7 @@ use tesdf::collide::{
     ShapeId, Velocity, coarse_contacts, detect,
 };
 use tesdf::encode::{EncodeChoices, EncodeError, EncodeFileError, Encoder, Preset};
-use tesdf::glam::{DMat3, DQuat, DVec3};
+use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{RepairMode, SolidMesh, UnknownRepair};
 use tesdf::{Length, Progress, TeSdf};
 
@@ -17,7 +17,7 @@ use super::read::LoadedScene;
 use super::units::Measure;
 use super::{BodySection, DetectorSection, SceneError, ShapeSection};
 use crate::newton::{Detect, Newton};
-use crate::{DynamicsError, Mass, MassProperties, System};
+use crate::{DynamicsError, Mass, MassProperties, System, inertia_matrix};
 
 /// Default contact distance, as a fraction of the smallest free body's diagonal.
 const CONTACT_DISTANCE: f64 = 5e-3;
@@ -379,9 +379,7 @@ fn of_mass(
     of_geometry: impl Fn() -> Result<MassProperties, String>,
 ) -> Result<MassProperties, String> {
     let of_geometry = || of_geometry()?.with_mass(mass).map_err(|e| e.to_string());
-    let given = body.inertia.map(|[xx, yy, zz, xy, xz, yz]| {
-        DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz))
-    });
+    let given = body.inertia.map(inertia_matrix);
     let (center, inertia) = match (body.center_of_mass, given) {
         (None, None) => return of_geometry(),
         (Some(center), Some(inertia)) => (DVec3::from_array(center), inertia),
