@@ -232,7 +232,8 @@ fn of_quaternion(&[x, y, z, i, j, k, w]: &[f64; 7]) -> Result<Pose, CollideError
     Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w))
 }
 
-fn of_twist(&[x, y, z, i, j, k]: &[f64; 6]) -> Velocity {
+/// The velocity of six numbers.
+pub fn of_twist(&[x, y, z, i, j, k]: &[f64; 6]) -> Velocity {
     Velocity { linear: DVec3::new(x, y, z), angular: DVec3::new(i, j, k) }
 }
 

@@ -7,7 +7,7 @@ use tesdf_sim::newton::Newton;
 use tesdf_sim::{Drive, Dynamics, Mass, MassProperties, Motor, State, System, World, inertia_matrix};
 
 use crate::errors::{Error, argument, kind_of};
-use crate::poses::{self, of_pose, of_velocity};
+use crate::poses::{self, of_pose, of_twist, of_velocity};
 
 /// The number of a body or joint, given by its name or number.
 pub fn index_of(what: &str, any: &Bound<'_, PyAny>, names: &[String]) -> PyResult<usize> {
@@ -126,8 +126,9 @@ pub fn states(
     }
     if let Some(any) = velocities {
         let found = of_bodies::<6>("velocities", any, rows, first.len())?;
-        for (&[x, y, z, i, j, k], state) in found.iter().flatten().zip(states.iter_mut().flatten()) {
-            (state.linear, state.angular) = (DVec3::new(x, y, z), DVec3::new(i, j, k));
+        for (row, state) in found.iter().flatten().zip(states.iter_mut().flatten()) {
+            let Velocity { linear, angular } = of_twist(row);
+            (state.linear, state.angular) = (linear, angular);
         }
     }
     Ok(Some(states))

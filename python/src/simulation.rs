@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 use tesdf::Progress;
@@ -22,7 +22,7 @@ use crate::errors::{Error, argument};
 use crate::interrupt::{POLL, cancellable};
 use crate::opening::{Opened, Replaced, Source};
 use crate::poses::{Count, of_pose, of_velocity, poses, velocities};
-use crate::settings::{self, index_of};
+use crate::settings::{self, index_of, rows_of, shaped};
 use crate::{classes, forces, pool};
 
 /// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and
@@ -313,8 +313,6 @@ impl Simulation {
         let velocities = each()
             .filter_map(|(step, body)| record.velocity(step, body))
             .flat_map(|[linear, angular]| of_velocity(&Velocity { linear, angular }));
-        let shaped =
-            |numbers: Vec<f64>, width: usize| PyArray1::from_vec(py, numbers).reshape([steps, bodies, width]);
         let contacts: Vec<_> = record.contacts().collect();
         let all = || contacts.iter().flat_map(|(_, of_step)| of_step);
         let of_row = contacts.iter().flat_map(|(step, of_step)| of_step.iter().map(move |_| *step));
@@ -324,8 +322,8 @@ impl Simulation {
         let joints: Vec<_> = forces.iter().flat_map(|(_, f)| f.joints.iter().copied()).collect();
         Columns::new(py)
             .add("times", record.times().iter().copied())?
-            .with("poses", shaped(poses.collect(), 7)?.into_any())?
-            .with("velocities", shaped(velocities.collect(), 6)?.into_any())?
+            .with("poses", shaped(py, poses, [steps, bodies, 7])?)?
+            .with("velocities", shaped(py, velocities, [steps, bodies, 6])?)?
             .add("contact_steps", contacts.iter().map(|(step, _)| *step))?
             .add("steps", of_row)?
             .add_rows("points", all().map(|c| c.point))?
@@ -600,17 +598,18 @@ impl Simulation {
 
     /// Current poses [B, 7] of the bodies' frames, x y z qx qy qz qw.
     #[getter]
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let poses: Vec<_> = self.read(py, |r| r.states().iter().map(|state| of_pose(&state.pose)).collect());
-        PyArray1::from_slice(py, poses.as_flattened()).reshape([poses.len(), 7])
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let poses: Vec<_> = self.read(py, |r| rows_of(r.states()).map(|(pose, _)| pose).collect());
+        let bodies = poses.len();
+        shaped(py, poses.into_flattened(), [bodies, 7])
     }
 
     /// Current velocities [B, 6], vx vy vz wx wy wz: of the centre of mass, and angular.
     #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let velocity = |&State { linear, angular, .. }: &State| of_velocity(&Velocity { linear, angular });
-        let velocities: Vec<_> = self.read(py, |r| r.states().iter().map(velocity).collect());
-        PyArray1::from_slice(py, velocities.as_flattened()).reshape([velocities.len(), 6])
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let velocities: Vec<_> = self.read(py, |r| rows_of(r.states()).map(|(_, velocity)| velocity).collect());
+        let bodies = velocities.len();
+        shaped(py, velocities.into_flattened(), [bodies, 6])
     }
 
     /// The contacts at the beginning of the last step: StepContacts. They include contacts that the

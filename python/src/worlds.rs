@@ -7,7 +7,6 @@ use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 use tesdf::Progress;
-use tesdf::collide::Velocity;
 use tesdf::glam::DVec3;
 use tesdf_sim::newton::Newton;
 use tesdf_sim::{self as sim, Dynamics, Forces, JointForce, System, World, Wrench};
@@ -17,7 +16,7 @@ use crate::detection::named;
 use crate::errors::{Error, argument};
 use crate::interrupt::{POLL, cancellable};
 use crate::opening::{Opened, Replaced, Source};
-use crate::poses::{columns, poses_of};
+use crate::poses::{columns, of_twist, poses_of};
 use crate::settings::{self, index_of, rows_of, shaped};
 use crate::simulation::Snapshot;
 use crate::{arrays, forces, pool};
@@ -270,12 +269,13 @@ impl Worlds {
     }
 
     /// Worlds that go on from the same moment on their own. They share the meshes.
-    fn copy(&self) -> Self {
-        Self { threads: Arc::clone(&self.threads), inner: Mutex::new(self.locked().clone()) }
+    fn copy(&self, py: Python<'_>) -> Self {
+        let worlds = py.detach(|| self.locked().clone());
+        Self { threads: Arc::clone(&self.threads), inner: Mutex::new(worlds) }
     }
 
-    fn __copy__(&self) -> Self {
-        self.copy()
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        self.copy(py)
     }
 
     /// Sets the masses of a free body, kg: a number or [k]; center_of_mass [3] or [k, 3], m, and
@@ -407,11 +407,7 @@ impl Worlds {
         let velocity = optional(velocity.map(|any| columns::<6>("velocity", any, rows)), rows)?;
         let values: Vec<_> = pose.into_iter().zip(velocity).collect();
         self.set(py, chosen, values, |engine, (pose, velocity)| {
-            let velocity = velocity.map(|[x, y, z, i, j, k]| Velocity {
-                linear: DVec3::new(x, y, z),
-                angular: DVec3::new(i, j, k),
-            });
-            settings::set_state(engine, body, pose, velocity)
+            settings::set_state(engine, body, pose, velocity.as_ref().map(of_twist))
         })
     }
 
