@@ -93,7 +93,7 @@ pub fn view(
         let most = contacts;
         let detection = loaded.detection(system).filter(|_| most > 0);
         let options = ContactOptions { detection, most };
-        let forces = if most > 0 { run.forces(most) } else { None };
+        let forces = run.forces(most);
         let contacts = run.contacts(system, &options, stop, |_| {}).map_err(Error::Playback)?;
         let title = title.as_deref().unwrap_or(name);
         let arrows = Arrows { contacts: contacts.as_deref(), forces: forces.as_deref() };

@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let run = Playback::new(record, system, args.frames.frames()).map_err(at)?;
     let contacts = contacts(args, &opened, &run, interrupted).map_err(at)?;
-    let forces = if args.contacts > 0 { run.forces(args.contacts) } else { None };
+    let forces = run.forces(args.contacts);
     let name = || args.run.file_stem().map(|name| name.to_string_lossy().into_owned());
     let title = args.title.clone().or_else(name).unwrap_or_default();
     let page = page(&run, Arrows { contacts: contacts.as_deref(), forces: forces.as_deref() }, &title)

@@ -28,10 +28,10 @@ pub struct DrawnForce {
 
 impl Playback<'_> {
     /// The contact forces of each frame, of which at most `most` are kept: the greatest of each of
-    /// the cubes of [`ContactOptions::most`](crate::ContactOptions::most). `None` where the run has
-    /// recorded no forces.
+    /// the cubes of [`ContactOptions::most`](crate::ContactOptions::most). `None` where that is
+    /// 0, or the run has recorded no forces.
     pub fn forces(&self, most: usize) -> Option<Vec<FrameForces>> {
-        if self.record.forces().len() == 0 {
+        if most == 0 || self.record.forces().len() == 0 {
             return None;
         }
         let of_frame = |&step: &usize| {
