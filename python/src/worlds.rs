@@ -479,12 +479,7 @@ impl Worlds {
     fn net_contact_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let [bodies, _] = self.counts(py);
         self.numbers(py, &[bodies, 3], |world, to| {
-            let mut sums = vec![DVec3::ZERO; bodies];
-            for contact in forces_of(world).into_iter().flat_map(|forces| &forces.contacts) {
-                let [first, second] = contact.bodies;
-                sums[first] += contact.force();
-                sums[second] -= contact.force();
-            }
+            let sums = forces_of(world).map_or_else(|| vec![DVec3::ZERO; bodies], |forces| forces.on_each(bodies));
             to.extend(sums.iter().flat_map(DVec3::to_array));
         })
     }

@@ -76,4 +76,15 @@ impl Forces {
         };
         self.contacts.iter().map(of_contact).sum()
     }
+
+    /// The force of all contacts on each of `bodies` bodies, in the world, N.
+    pub fn on_each(&self, bodies: usize) -> Vec<DVec3> {
+        let mut sums = vec![DVec3::ZERO; bodies];
+        for contact in &self.contacts {
+            let [first, second] = contact.bodies;
+            sums[first] += contact.force();
+            sums[second] -= contact.force();
+        }
+        sums
+    }
 }
