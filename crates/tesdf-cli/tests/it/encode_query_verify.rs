@@ -130,15 +130,7 @@ fn ctrl_c_leaves_no_half_file() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Without the handler the signal would end the process, which would test nothing.
-    let catches = || {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-        let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap().trim();
-        u64::from_str_radix(caught, 16).unwrap() & 1 << (2 - 1) != 0
-    };
-    while !catches() {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    crate::folder::wait_for_handler(&child);
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let (code, out, err) = crate::folder::texts(child.wait_with_output().unwrap());
     assert_eq!((code, out.as_str()), (Some(2), ""));

@@ -2,7 +2,7 @@
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use crate::folder::{Folder, texts};
+use crate::folder::{Folder, texts, wait_for_handler};
 
 /// A command that reads from a pipe into which nobody writes, once it catches signals.
 fn reading(folder: &Folder, before: &str, args: &str) -> Child {
@@ -16,15 +16,7 @@ fn reading(folder: &Folder, before: &str, args: &str) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Without the handler the signal would end the process, which would test nothing.
-    let catches = || {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
-        u64::from_str_radix(caught, 16).unwrap() & 1 << (2 - 1) != 0
-    };
-    while !catches() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_for_handler(&child);
     child
 }
 

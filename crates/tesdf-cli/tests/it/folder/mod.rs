@@ -1,7 +1,7 @@
 //! A folder for each test, and the binary that runs in it.
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
 
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::scene_file::LoadedScene;
@@ -55,6 +55,20 @@ impl Folder {
 pub fn texts(out: Output) -> (Option<i32>, String, String) {
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (out.status.code(), text(out.stdout), text(out.stderr))
+}
+
+/// Waits until a process catches Ctrl-C. Without the handler the signal would end the process, which
+/// would test nothing.
+#[cfg(target_os = "linux")]
+pub fn wait_for_handler(child: &Child) {
+    let catches = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
+        u64::from_str_radix(caught, 16).unwrap() & 1 << (2 - 1) != 0
+    };
+    while !catches() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
 }
 
 /// A path in the library's test data.
