@@ -1,4 +1,5 @@
-//! What is set between steps, from arguments: bodies and joints by name or number, motors, masses, states.
+//! What is set between steps, from arguments: bodies and joints by name or number, motors, masses,
+//! states.
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use tesdf::collide::{Pose, Velocity};

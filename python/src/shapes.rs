@@ -28,8 +28,8 @@ fn classes(py: Python<'_>) -> PyResult<Classes<'_, '_>> {
     })
 }
 
-/// Converts an asset, an object of `tesdf.shapes`, or a mesh in memory, which is encoded. The library
-/// checks sizes.
+/// Converts an asset, an object of `tesdf.shapes`, or a mesh in memory, which is encoded. The
+/// library checks sizes.
 ///
 /// # Errors
 /// `ValueError` names the argument and what was found; those of `tesdf.encode`.

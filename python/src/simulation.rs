@@ -119,7 +119,8 @@ impl Running {
     }
 }
 
-/// A moment of a Simulation, or of Worlds, to go back to with restore. It cannot be stored in a file.
+/// A moment of a Simulation, or of Worlds, to go back to with restore. It cannot be stored in a
+/// file.
 #[pyclass(frozen, module = "tesdf")]
 pub struct Snapshot {
     /// One for each world.
@@ -303,8 +304,8 @@ impl Simulation {
         self.try_read(py, |r| r.record()?.save(&path).map_err(|e| Error::Record(path, e)))
     }
 
-    /// All states so far, recorded contacts, forces and warnings: Record(times, poses, velocities, ...),
-    /// copied.
+    /// All states so far, recorded contacts, forces and warnings: Record(times, poses, velocities,
+    /// ...), copied.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let record = self.try_read(py, Running::record)?;
         let (steps, bodies) = (record.times().len(), record.bodies.len());
@@ -340,8 +341,8 @@ impl Simulation {
     }
 
     /// Serves a page on this machine that follows the steps from now on, until the simulation is
-    /// deleted: LiveView, whose open() shows it in a browser, and which a notebook shows. title is its
-    /// heading.
+    /// deleted: LiveView, whose open() shows it in a browser, and which a notebook shows. title is
+    /// its heading.
     ///
     /// Raises SimulationError where the machine has no loopback interface.
     #[pyo3(signature = (*, title = "simulation"))]

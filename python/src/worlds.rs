@@ -30,10 +30,10 @@ use crate::{arrays, forces, pool};
 /// - mode, time_step: replace those of the scene.
 /// - threads: number of threads; None is one per core.
 ///
-/// States are arrays [n, ...] with a row for each world; bodies and joints have the numbers of their
-/// order in the scene. Methods that set something take one value for all worlds, or an array with a
-/// row for each, and worlds: the worlds concerned, as their numbers or as a mask [n]; None is all.
-/// Units are SI.
+/// States are arrays [n, ...] with a row for each world; bodies and joints have the numbers of
+/// their order in the scene. Methods that set something take one value for all worlds, or an array
+/// with a row for each, and worlds: the worlds concerned, as their numbers or as a mask [n]; None
+/// is all. Units are SI.
 ///
 /// Raises OSError if a file cannot be read, and SceneError with the line of the scene.
 #[pyclass(frozen, module = "tesdf")]
@@ -193,11 +193,11 @@ impl Worlds {
         Ok(Self { threads, inner: Mutex::new(worlds) })
     }
 
-    /// Makes `count` steps of each world. Ctrl-C ends it between two steps; the steps so far remain,
-    /// the same number in each world. No thread is started for a call.
+    /// Makes `count` steps of each world. Ctrl-C ends it between two steps; the steps so far
+    /// remain, the same number in each world. No thread is started for a call.
     ///
-    /// Raises SimulationError if a step of a world fails. That world stays as it was before the step;
-    /// the others make theirs.
+    /// Raises SimulationError if a step of a world fails. That world stays as it was before the
+    /// step; the others make theirs.
     #[pyo3(signature = (count = 1))]
     fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
         let mut left = count;
@@ -220,10 +220,10 @@ impl Worlds {
     }
 
     /// Begins worlds again at time 0, with the states of the scene's beginning, or with these poses
-    /// [B, 7], x y z qx qy qz qw, and velocities [B, 6], or [k, B, ...] with a row for each of the k
-    /// worlds. Motors are those of the scene, wrenches zero. Masses, friction and gravity stay as
-    /// they were set. The steps from there on have the same bytes as those of new worlds. Takes some
-    /// microseconds for each world.
+    /// [B, 7], x y z qx qy qz qw, and velocities [B, 6], or [k, B, ...] with a row for each of the
+    /// k worlds. Motors are those of the scene, wrenches zero. Masses, friction and gravity stay as
+    /// they were set. The steps from there on have the same bytes as those of new worlds. Takes
+    /// some microseconds for each world.
     #[pyo3(signature = (worlds = None, *, poses = None, velocities = None))]
     fn reset(
         &self,

@@ -70,8 +70,8 @@ pub struct Args {
     /// Report contacts up to this signed distance, in the meshes' unit
     #[arg(long, value_name = "D", value_parser = parse::length, default_value_t = 0.0, allow_hyphen_values = true)]
     pub contact_distance: f64,
-    /// In the modes `face` and `exact`: drop a contact when the cosine between the face's normal and
-    /// the field's gradient is below this, or `off`
+    /// In the modes `face` and `exact`: drop a contact when the cosine between the face's normal
+    /// and the field's gradient is below this, or `off`
     #[arg(long, value_name = "C|off", value_parser = cosine, default_value = "off", allow_hyphen_values = true)]
     pub cos_theta: Cosine,
     /// Number of Frank-Wolfe iterations in the mode `face` [default: 16]

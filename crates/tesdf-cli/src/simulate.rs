@@ -68,8 +68,8 @@ pub struct Args {
     /// user's folder for caches, or that of the environment variable TESDF_CACHE
     #[arg(long)]
     pub no_cache: bool,
-    /// Serve a page on this machine that follows the run. Its address is printed on stderr. After the
-    /// run it is served until Ctrl-C
+    /// Serve a page on this machine that follows the run. Its address is printed on stderr. After
+    /// the run it is served until Ctrl-C
     #[arg(long)]
     pub view: bool,
     /// Print the result as JSON

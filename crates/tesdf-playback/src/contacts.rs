@@ -132,8 +132,8 @@ impl Playback<'_> {
     }
 }
 
-/// At most this many arrows, spread over cubes of this edge. They are and stay in the order of their
-/// importance.
+/// At most this many arrows, spread over cubes of this edge. They are and stay in the order of
+/// their importance.
 pub(crate) fn spread<T: Copy>(arrows: Vec<T>, point: fn(&T) -> Vec3, edge: f64, most: usize) -> Vec<T> {
     if arrows.len() <= most {
         return arrows;

@@ -168,8 +168,8 @@ impl Shared {
         self.sent.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The frames from number `next` on, once there are any or after some seconds, and whether there
-    /// will be more.
+    /// The frames from number `next` on, once there are any or after some seconds, and whether
+    /// there will be more.
     fn wait(&self, next: usize) -> (Vec<String>, bool) {
         let waits = |sent: &mut Sent| sent.frames.len() <= next && !sent.has_ended && !sent.is_closed;
         let waited = self.grown.wait_timeout_while(self.sent(), PATIENCE, waits);

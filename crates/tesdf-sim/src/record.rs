@@ -25,20 +25,21 @@
 //! | `forces.joints` | `f32 [Q · J, 7]` | on the child: force, N; torque, N m; what the motor does |
 //!
 //! S is the number of steps, B of bodies, J of joints, R of steps with recorded contacts, C of
-//! contacts, H of hidden overlaps, Q of steps with recorded forces, and F of contacts that push. The
-//! contacts and hidden overlaps of a step are those at its beginning, that is, at `poses[step]`. Its
-//! [forces](crate::Forces) are means from `poses[step]` to `poses[step + 1]`. An overlap of two
-//! bodies is hidden when no contact shows it.
+//! contacts, H of hidden overlaps, Q of steps with recorded forces, and F of contacts that push.
+//! The contacts and hidden overlaps of a step are those at its beginning, that is, at
+//! `poses[step]`. Its [forces](crate::Forces) are means from `poses[step]` to `poses[step + 1]`. An
+//! overlap of two bodies is hidden when no contact shows it.
 //!
 //! A file without hidden overlaps has no `hidden.…` tensors, one without recorded forces no
 //! `forces.…` tensors.
 //!
 //! The metadata has one key, `tesdf_run`. Its value is JSON with `version`, `bodies` and `joints`
-//! (names), `scene` (the scene as JSON) and `folder`, the folder that the scene's paths are relative to. A
-//! run that was saved before its end also has `planned`, its planned number of steps. A run that
-//! did not do all that its scene asks has `warnings`: at most one [`Warning`] of each kind, with the
-//! keys `kind`, `names`, `time` (of the first, s), `value` (the worst), `count` and `message`. Those
-//! of the kind `hidden` are not among them: they follow from the `hidden.…` tensors.
+//! (names), `scene` (the scene as JSON) and `folder`, the folder that the scene's paths are
+//! relative to. A run that was saved before its end also has `planned`, its planned number of
+//! steps. A run that did not do all that its scene asks has `warnings`: at most one [`Warning`] of
+//! each kind, with the keys `kind`, `names`, `time` (of the first, s), `value` (the worst), `count`
+//! and `message`. Those of the kind `hidden` are not among them: they follow from the `hidden.…`
+//! tensors.
 //!
 //! A run grows as a journal of steps under its final name. At the end the complete file replaces
 //! the journal. [`RunRecord::open`] reads both. [`InterruptedRun`] reads a journal to resume the

@@ -280,7 +280,8 @@ impl Run {
     /// Makes one step with `engine`. The scene's duration does not limit the number of steps.
     ///
     /// # Errors
-    /// [`SimulateError::Step`] or [`SimulateError::NoForces`]; the record then ends before the step.
+    /// [`SimulateError::Step`] or [`SimulateError::NoForces`]; the record then ends before the
+    /// step.
     pub fn step<'a>(&'a mut self, engine: &'a mut dyn Dynamics) -> Result<Moment<'a>, SimulateError> {
         let (step, h) = (self.record.steps(), self.time_step);
         let failed = |source| SimulateError::Step { step, source };

@@ -467,12 +467,13 @@ impl System {
         self.replace_states(states, self.coordinates.clone())
     }
 
-    /// Begins again with these states: coordinates of joints are counted anew, and wrenches are zero.
-    /// Rotations of unit length stay bit for bit, up to rounding. On an error nothing changes.
+    /// Begins again with these states: coordinates of joints are counted anew, and wrenches are
+    /// zero. Rotations of unit length stay bit for bit, up to rounding. On an error nothing
+    /// changes.
     ///
     /// # Errors
-    /// As [`set_states`](Self::set_states), and [`DynamicsError::Collide`] when a rotation is not of
-    /// unit length.
+    /// As [`set_states`](Self::set_states), and [`DynamicsError::Collide`] when a rotation is not
+    /// of unit length.
     pub fn reset(&mut self, mut states: Vec<State>) -> Result<(), DynamicsError> {
         for (body, state) in states.iter_mut().enumerate().take(self.bodies.len()) {
             self.check(body, state)?;

@@ -8,8 +8,8 @@ use crate::scene_file::SceneFile;
 use crate::script::Scripts;
 use crate::{Dynamics, DynamicsError, Mass, Moment, Motor, Run, SimulateError, State, StepReport};
 
-/// The bodies of a scene in motion: an engine, the scripts that drive it, and its time. A clone shares
-/// meshes and scripts.
+/// The bodies of a scene in motion: an engine, the scripts that drive it, and its time. A clone
+/// shares meshes and scripts.
 #[derive(Clone)]
 pub struct World {
     engine: Newton,
@@ -82,7 +82,8 @@ impl World {
         &self.beginning.states
     }
 
-    /// The masses at the beginning. One that is scaled from these does not depend on those set before.
+    /// The masses at the beginning. One that is scaled from these does not depend on those set
+    /// before.
     pub fn first_masses(&self) -> &[Mass] {
         &self.beginning.masses
     }
@@ -111,9 +112,9 @@ impl World {
         Ok(moment)
     }
 
-    /// Begins again at time 0 with these states, or those at the [beginning](Self::first_states). Motors
-    /// are those of the scene, and wrenches zero. Masses, friction and gravity stay as they were set. The
-    /// steps from there on have the same bytes as those of a new world.
+    /// Begins again at time 0 with these states, or those at the [beginning](Self::first_states).
+    /// Motors are those of the scene, and wrenches zero. Masses, friction and gravity stay as they
+    /// were set. The steps from there on have the same bytes as those of a new world.
     ///
     /// # Errors
     /// As [`Newton::reset`]; nothing changes then.
@@ -141,8 +142,8 @@ impl World {
     }
 }
 
-/// Worlds of one scene, which do not meet. All threads of the current rayon pool step them, and each
-/// world has the same bytes as it has alone.
+/// Worlds of one scene, which do not meet. All threads of the current rayon pool step them, and
+/// each world has the same bytes as it has alone.
 #[derive(Clone)]
 pub struct Worlds(Vec<World>);
 
@@ -175,7 +176,8 @@ impl Worlds {
     /// Makes `count` steps of each world.
     ///
     /// # Errors
-    /// [`WorldError`]. The world stays as it was before the failed step; the others make all their steps.
+    /// [`WorldError`]. The world stays as it was before the failed step; the others make all their
+    /// steps.
     pub fn step(&mut self, count: u64) -> Result<(), WorldError> {
         let step = |(world, it): (usize, &mut World)| {
             let made = (0..count).try_for_each(|_| it.step().map(|_| ()));

@@ -12,9 +12,9 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// Whether the command looks at the flag.
 static IS_WATCHED: AtomicBool = AtomicBool::new(false);
 
-/// Lets Ctrl-C, SIGTERM and SIGHUP end the command with exit code 2: at once where it does not look at
-/// the [`flag`], and otherwise when it sees the flag, but within a second. The second signal ends it
-/// at once. A process that ignores SIGHUP, as those of `nohup` do, goes on ignoring it.
+/// Lets Ctrl-C, SIGTERM and SIGHUP end the command with exit code 2: at once where it does not look
+/// at the [`flag`], and otherwise when it sees the flag, but within a second. The second signal
+/// ends it at once. A process that ignores SIGHUP, as those of `nohup` do, goes on ignoring it.
 ///
 /// # Errors
 /// The system refuses the handler.
@@ -47,8 +47,8 @@ pub fn flag() -> &'static AtomicBool {
     &INTERRUPTED
 }
 
-/// Ends the process. Files are written under a temporary name and then renamed, so no incomplete file
-/// has its final name. The journal of a run is readable up to its last complete step.
+/// Ends the process. Files are written under a temporary name and then renamed, so no incomplete
+/// file has its final name. The journal of a run is readable up to its last complete step.
 fn end() {
     report::error(&Failure::new("interrupted; no output is half written, and a run holds its steps so far"));
     std::process::exit(2);

@@ -108,8 +108,8 @@ impl Newton {
             Place { found, row, restitution }
         });
         let places: Vec<Place<'_>> = places.collect();
-        // Bodies move by the velocities at the ends of steps: where they are, these lack half of what
-        // gravity gives in a step. With it, a ball of restitution 1 comes back to its height.
+        // Bodies move by the velocities at the ends of steps: where they are, these lack half of
+        // what gravity gives in a step. With it, a ball of restitution 1 comes back to its height.
         let lag = pack(0.5 * step.whole * self.system.gravity, DVec3::ZERO);
         let now = |free: &FreeBody| velocity(&self.system.states()[free.body]) + lag;
         let start: Vec<_> = step.free.iter().map(now).collect();

@@ -117,7 +117,8 @@ impl Newton {
         Ok(())
     }
 
-    /// Sets the mass properties of a free body from now on. It wakes. Its points keep their velocities.
+    /// Sets the mass properties of a free body from now on. It wakes. Its points keep their
+    /// velocities.
     ///
     /// # Errors
     /// As [`System::set_mass`].
@@ -127,8 +128,8 @@ impl Newton {
         Ok(())
     }
 
-    /// Sets the coefficient of friction of a body from now on, as [`System::friction`] uses it. It wakes,
-    /// with the bodies that it touches.
+    /// Sets the coefficient of friction of a body from now on, as [`System::friction`] uses it. It
+    /// wakes, with the bodies that it touches.
     ///
     /// # Errors
     /// As [`System::set_friction`].
@@ -220,7 +221,8 @@ impl Newton {
         Ok(Look::new(self.detect(step, ahead, HiddenSearch::On)?))
     }
 
-    /// The first look of a part: it looks only at pairs of which a body has moved since the last one.
+    /// The first look of a part: it looks only at pairs of which a body has moved since the last
+    /// one.
     fn first_look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
         let start = Instant::now();
         let options = CollideOptions { hidden: HiddenSearch::On, ..self.options_of(step.h) };
@@ -249,10 +251,10 @@ impl Newton {
     /// Whether no body moves so far with the velocities of `ahead` that a look would have to be
     /// extended, wherever it looked: each pair closes by less than the contact distance.
     ///
-    /// The origins of two bodies whose boxes meet are at most `2 √3 r` apart, where `r` is the greatest
-    /// distance of a point from its origin. So with the greatest way `w` of an origin and the greatest
-    /// rotation `t`, points move by at most `2 w + 6 r t` as seen from the other body, and by terms of
-    /// second order.
+    /// The origins of two bodies whose boxes meet are at most `2 √3 r` apart, where `r` is the
+    /// greatest distance of a point from its origin. So with the greatest way `w` of an origin and
+    /// the greatest rotation `t`, points move by at most `2 w + 6 r t` as seen from the other body,
+    /// and by terms of second order.
     fn is_slow(&self, step: &Step, ahead: &[State]) -> bool {
         let (mut way, mut turn) = (0.0, 0.0);
         for (k, (body, state)) in self.system.bodies().iter().zip(ahead).enumerate() {

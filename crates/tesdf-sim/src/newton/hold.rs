@@ -1,8 +1,9 @@
 //! Bodies that a step would move by no more than it is exact stay where they are, bit for bit.
 //!
-//! A minimisation leaves bodies at rest with velocities of 1e-13 to 1e-11 of those that gravity gives
-//! them in the step: by these they would creep, and nothing would ever be as it was. Where they stay,
-//! the next step need neither detect their contacts (`seen.rs`) nor find their forces (`kept.rs`).
+//! A minimisation leaves bodies at rest with velocities of 1e-13 to 1e-11 of those that gravity
+//! gives them in the step: by these they would creep, and nothing would ever be as it was. Where
+//! they stay, the next step need neither detect their contacts (`seen.rs`) nor find their forces
+//! (`kept.rs`).
 use nalgebra::Vector6;
 
 use super::Newton;
@@ -10,9 +11,9 @@ use super::integrate::{unpack, velocity};
 use super::step::Step;
 use crate::State;
 
-/// A body stays when its velocity at the end of a step is below this share of that which gravity and
-/// wrenches give it in the step: when all that acts on it, contacts included, accelerates it by less
-/// than this share of its weight.
+/// A body stays when its velocity at the end of a step is below this share of that which gravity
+/// and wrenches give it in the step: when all that acts on it, contacts included, accelerates it by
+/// less than this share of its weight.
 const HELD: f64 = 1e-10;
 
 impl Newton {

@@ -49,8 +49,8 @@ pub fn joint_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
     rows(bodies, h, |measure| measure)
 }
 
-/// The same for an impact, which takes no time: what must hold, whatever it takes, stops to move, and
-/// all else, such as limits, springs and motors of limited force, does nothing.
+/// The same for an impact, which takes no time: what must hold, whatever it takes, stops to move,
+/// and all else, such as limits, springs and motors of limited force, does nothing.
 pub fn impact_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
     rows(bodies, h, |measure| match measure {
         Measure { error: Error::Position(_), bounds: FREE, .. } => {
@@ -109,9 +109,9 @@ pub fn row_count(joint: &Joint) -> usize {
     held + limits + resisting + usize::from(joint.motor.is_some())
 }
 
-/// The measures of a joint. Their number depends on the joint alone. The angle of a hinge is the one
-/// of all turns that is nearest to `near`. `before` is the rate of its coordinate at the beginning of
-/// the step.
+/// The measures of a joint. Their number depends on the joint alone. The angle of a hinge is the
+/// one of all turns that is nearest to `near`. `before` is the rate of its coordinate at the
+/// beginning of the step.
 fn measures(joint: &Joint, poses: [Pose; 2], near: f64, before: f64, h: f64) -> Vec<Measure> {
     let [a, b] = joint.frames_in_world(poses);
     let [x, y, z] = axes(a);

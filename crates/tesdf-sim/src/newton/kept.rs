@@ -53,7 +53,8 @@ pub struct Known<'a> {
 }
 
 impl Kept {
-    /// What is kept of rows with the ids of `rows`, in a step that begins with the velocities `start`.
+    /// What is kept of rows with the ids of `rows`, in a step that begins with the velocities
+    /// `start`.
     pub fn of<'a>(&'a self, rows: &[Row], start: &'a [Vector6<f64>]) -> Option<Known<'a>> {
         let ids = || self.rows.iter().map(|row| row.id);
         (!self.rows.is_empty()).then(|| Known { kept: self, start, of_rows: matches(ids(), rows) })
@@ -117,8 +118,8 @@ impl Known<'_> {
         carry(&self.of_rows, &self.kept.forces[Gap::Position as usize])
     }
 
-    /// The velocities of the bodies and the forces of the rows of an island whose problem is that of
-    /// the last step.
+    /// The velocities of the bodies and the forces of the rows of an island whose problem is that
+    /// of the last step.
     pub fn solution(
         &self,
         step: &Step,

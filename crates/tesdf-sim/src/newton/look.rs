@@ -39,8 +39,8 @@ impl Look {
         Self { contacts, ways: Vec::new() }
     }
 
-    /// Finds how far the first detection has looked, if that is not known: that of `scene` with these
-    /// options.
+    /// Finds how far the first detection has looked, if that is not known: that of `scene` with
+    /// these options.
     pub fn measure(&mut self, scene: &Scene, options: &CollideOptions) -> Result<(), CollideError> {
         if self.ways.is_empty() {
             self.ways.push(Way::new(scene, options.contact_distance, options.speculative_time)?);

@@ -79,8 +79,8 @@ use sleep::Sleep;
 /// signature implement this trait.
 pub trait Detect: Send + Sync {
     /// All contacts within the distances of `options`, in an order that depends on the scene alone.
-    /// Those of a pair depend on its two instances alone: [`Newton`] does not ask again for pairs of
-    /// instances that stay as they were, and [marks](Scene::set_still) them.
+    /// Those of a pair depend on its two instances alone: [`Newton`] does not ask again for pairs
+    /// of instances that stay as they were, and [marks](Scene::set_still) them.
     ///
     /// # Errors
     /// The errors of the detection, as [`CollideError`].
@@ -104,8 +104,8 @@ where
     }
 }
 
-/// The built-in engine: Newton's method on a regularised convex problem of all contacts. A clone shares
-/// meshes and detector, and makes the same steps.
+/// The built-in engine: Newton's method on a regularised convex problem of all contacts. A clone
+/// shares meshes and detector, and makes the same steps.
 #[derive(Clone)]
 pub struct Newton {
     system: System,

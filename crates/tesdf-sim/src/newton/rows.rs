@@ -215,8 +215,8 @@ pub struct Bodies<'a> {
     pub free_of: &'a [Option<usize>],
 }
 
-/// Of each of `rows`, the index of the row of the same id among those whose ids are `before`, in the
-/// order in which these come.
+/// Of each of `rows`, the index of the row of the same id among those whose ids are `before`, in
+/// the order in which these come.
 pub fn matches(before: impl Iterator<Item = RowId> + Clone, rows: &[Row]) -> Vec<Option<usize>> {
     fn ordered(ids: impl Iterator<Item = RowId>) -> Vec<(RowId, usize)> {
         let pair = |(id, _): &(RowId, usize)| match id {

@@ -1,8 +1,8 @@
 //! What the last look has found, so that bodies that have not moved since are not looked at again.
 //!
 //! What is found of a pair depends on the states of its two bodies and on the options alone. Where
-//! these are the same bit for bit, so are the contacts of a new detection. So this is no part of the
-//! state of a run: nothing changes where it is dropped.
+//! these are the same bit for bit, so are the contacts of a new detection. So this is no part of
+//! the state of a run: nothing changes where it is dropped.
 use std::iter::zip;
 
 use tesdf::collide::{CollideOptions, Contact, Contacts, Instance, InstanceId};
@@ -30,8 +30,8 @@ pub struct Unmoved {
 }
 
 impl Seen {
-    /// The bodies whose pairs the last look has seen as they are now. `None` where there are none, or
-    /// where marks cannot tell which they are.
+    /// The bodies whose pairs the last look has seen as they are now. `None` where there are none,
+    /// or where marks cannot tell which they are.
     pub fn unmoved(&self, system: &System, options: &CollideOptions) -> Option<Unmoved> {
         if self.options != Some(*options) {
             return None;

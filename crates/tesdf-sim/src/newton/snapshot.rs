@@ -10,8 +10,8 @@ use super::sleep::Sleep;
 use crate::forces::Forces;
 use crate::{DynamicsError, State, System};
 
-/// All that the next steps of a [`Newton`] depend on: the states, what was set (motors, wrenches, masses,
-/// friction, gravity), and what it remembers of the steps before.
+/// All that the next steps of a [`Newton`] depend on: the states, what was set (motors, wrenches,
+/// masses, friction, gravity), and what it remembers of the steps before.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     /// Those of the engine, which it shares with its clones alone.
@@ -24,7 +24,8 @@ pub struct Snapshot {
 }
 
 impl Newton {
-    /// What [`restore`](Self::restore) needs to go back to this moment. Meshes are shared, not copied.
+    /// What [`restore`](Self::restore) needs to go back to this moment. Meshes are shared, not
+    /// copied.
     pub fn snapshot(&self) -> Snapshot {
         let Self { surfaces, system, found, forces, sleep, kept, .. } = self;
         Snapshot {
@@ -37,8 +38,8 @@ impl Newton {
         }
     }
 
-    /// Goes back to a snapshot of this engine or of a clone. The steps from there on have the same bytes
-    /// as those after the snapshot.
+    /// Goes back to a snapshot of this engine or of a clone. The steps from there on have the same
+    /// bytes as those after the snapshot.
     ///
     /// # Errors
     /// [`DynamicsError::OtherEngine`].
@@ -55,9 +56,9 @@ impl Newton {
         Ok(())
     }
 
-    /// Begins again with these states: steps have the same bytes as those of a new engine whose bodies
-    /// have them. The angles of hinges are counted anew, wrenches are zero, and nothing is remembered of
-    /// earlier steps. Motors, masses, friction and gravity stay.
+    /// Begins again with these states: steps have the same bytes as those of a new engine whose
+    /// bodies have them. The angles of hinges are counted anew, wrenches are zero, and nothing is
+    /// remembered of earlier steps. Motors, masses, friction and gravity stay.
     ///
     /// # Errors
     /// As [`System::reset`].

@@ -16,8 +16,8 @@
 //! at the beginning of the last step follow if they are recorded: points, normals, distances and
 //! ids, in the types of the complete file. The ids and depths of the hidden overlaps at that time
 //! follow, then the forces of the last step if they are recorded: ids, points and contacts, and
-//! those of all joints. Where the `warnings` of the metadata are others than those of the frame before, they come
-//! last, as JSON; each replaces all before.
+//! those of all joints. Where the `warnings` of the metadata are others than those of the frame
+//! before, they come last, as JSON; each replaces all before.
 //!
 //! Each frame is written by one call, which does not wait for the disk. A process that is killed
 //! therefore loses at most its current step. A power failure also loses the data that the operating

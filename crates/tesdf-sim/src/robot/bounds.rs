@@ -7,8 +7,8 @@ use roxmltree::Node;
 
 use super::{RobotError, parse, read};
 
-/// Greatest depth of elements, with those of included files: each takes some kilobytes of the stack,
-/// and threads may have 2 MiB.
+/// Greatest depth of elements, with those of included files: each takes some kilobytes of the
+/// stack, and threads may have 2 MiB.
 const MAX_DEPTH: usize = 64;
 /// Greatest number of elements, each included file counted as often as it is included. The parser
 /// takes a time that grows with the square of the number of attached bodies.
@@ -33,8 +33,8 @@ struct Files<'a> {
 /// Checks the MJCF file at `path` and all files that it includes or attaches. Each is read once.
 ///
 /// # Errors
-/// A file cannot be read or is no XML, a file includes itself, elements are nested too deep, or there
-/// would be too many of them.
+/// A file cannot be read or is no XML, a file includes itself, elements are nested too deep, or
+/// there would be too many of them.
 pub(super) fn check(path: &Path) -> Result<(), RobotError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     Files { folder, known: BTreeMap::new(), open: Vec::new() }.measure(path, false).map(|_| ())

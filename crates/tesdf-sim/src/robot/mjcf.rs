@@ -1,7 +1,7 @@
 //! Reads MJCF.
 //!
-//! Parameters of MuJoCo's solver (`solref`, `solimp`, `margin`, `priority`, …), sensors, key frames,
-//! sites, cameras and lights are of MuJoCo, and are not read; `<option>` is the scene's.
+//! Parameters of MuJoCo's solver (`solref`, `solimp`, `margin`, `priority`, …), sensors, key
+//! frames, sites, cameras and lights are of MuJoCo, and are not read; `<option>` is the scene's.
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -50,8 +50,8 @@ pub(super) fn read_mjcf(path: &Path) -> Result<Robot, RobotError> {
     Ok(robot)
 }
 
-/// Finds what `mjcf-rs` leaves out without a word. The text has all includes, so its lines are those
-/// of the file where it includes none.
+/// Finds what `mjcf-rs` leaves out without a word. The text has all includes, so its lines are
+/// those of the file where it includes none.
 fn check(path: &Path, text: &str, unread: &mut Vec<Unread>) -> Result<(), RobotError> {
     let document = parse(path, text)?;
     for node in document.descendants().filter(roxmltree::Node::is_element) {

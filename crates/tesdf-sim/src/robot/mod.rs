@@ -28,8 +28,8 @@ pub enum RobotFormat {
     Mjcf,
 }
 
-/// Why a robot description cannot be read: the file and the line, what was found there, and what was
-/// expected.
+/// Why a robot description cannot be read: the file and the line, what was found there, and what
+/// was expected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct RobotError(pub String);
@@ -79,8 +79,8 @@ impl RobotFormat {
 }
 
 impl Robot {
-    /// Reads the robot description at `path`. Meshes of URDF are found in `packages`, by their names,
-    /// and where [`Packages`] looks.
+    /// Reads the robot description at `path`. Meshes of URDF are found in `packages`, by their
+    /// names, and where [`Packages`] looks.
     ///
     /// # Errors
     /// It cannot be read, or links and joints are no tree.

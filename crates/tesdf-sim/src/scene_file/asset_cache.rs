@@ -50,7 +50,8 @@ impl AssetCache {
         &self.folder
     }
 
-    /// The mesh files, or bodies of several parts, that were encoded so far because they were not in it.
+    /// The mesh files, or bodies of several parts, that were encoded so far because they were not
+    /// in it.
     pub fn encoded(&self) -> Vec<PathBuf> {
         self.encoded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

@@ -173,8 +173,8 @@ pub struct JointSection {
     /// The angle of a hinge, rad within ±π, or the travel of a slider, m, where the bodies start.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub coordinate: f64,
-    /// Bounds of a hinge's angle, rad, or of a slider's travel, m. Of a ball: 0 and the greatest angle
-    /// of its axis, rad.
+    /// Bounds of a hinge's angle, rad, or of a slider's travel, m. Of a ball: 0 and the greatest
+    /// angle of its axis, rad.
     #[serde(default)]
     pub limits: Option<[f64; 2]>,
     /// Drives a hinge or a slider.

@@ -35,8 +35,8 @@ pub struct PartSection {
 }
 
 /// A simple shape that is a mesh within a body. Round ones have 64 faces around their axis, whose
-/// corners are on the surface: the faces are up to 0.13 % of the radius below it, those of balls and
-/// round ends up to 0.25 %.
+/// corners are on the surface: the faces are up to 0.13 % of the radius below it, those of balls
+/// and round ends up to 0.25 %.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PartShape {
@@ -162,8 +162,8 @@ fn cuboid(half: DVec3) -> Result<TriangleMesh, String> {
     TriangleMesh::new((0..8).map(corner).collect(), faces).map_err(|e| e.to_string())
 }
 
-/// The solid of revolution of a profile of radius and height, which begins and ends on the axis, from
-/// below.
+/// The solid of revolution of a profile of radius and height, which begins and ends on the axis,
+/// from below.
 fn revolved(profile: &[[f64; 2]]) -> Result<TriangleMesh, String> {
     let (mut vertices, mut faces, mut rings) = (Vec::new(), Vec::new(), Vec::<Vec<u32>>::new());
     for &[radius, height] in profile {

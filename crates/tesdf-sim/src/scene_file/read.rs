@@ -98,8 +98,8 @@ impl LoadedScene {
         Self { scene, path, assets: None, memory: BTreeMap::new(), text }.with_copies()
     }
 
-    /// The scene with each copy of a body as a body of its own, and with the bodies and joints of its
-    /// robots.
+    /// The scene with each copy of a body as a body of its own, and with the bodies and joints of
+    /// its robots.
     fn with_copies(mut self) -> Result<Self, SceneError> {
         match expand(std::mem::take(&mut self.scene.bodies)) {
             Ok(bodies) => self.scene.bodies = bodies,

@@ -40,8 +40,8 @@ pub struct RobotSection {
     /// Motors of joints, by the joint's name in the file.
     #[serde(default)]
     pub motors: BTreeMap<String, RobotMotor>,
-    /// Coefficient of friction of all bodies [default: of MJCF the greatest of the body's geoms; URDF
-    /// has none: 0].
+    /// Coefficient of friction of all bodies [default: of MJCF the greatest of the body's geoms;
+    /// URDF has none: 0].
     #[serde(default)]
     pub friction: Option<f64>,
     /// Whether links that are not neighbours have contacts with each other.
@@ -53,8 +53,8 @@ pub struct RobotSection {
     /// Folders of packages, by name.
     #[serde(default)]
     pub packages: BTreeMap<String, PathBuf>,
-    /// Elements of the file that have no effect here, and that are left out, such as `mimic`. Without
-    /// it they are an error.
+    /// Elements of the file that have no effect here, and that are left out, such as `mimic`.
+    /// Without it they are an error.
     #[serde(default)]
     pub ignore: Vec<String>,
 }
@@ -291,7 +291,8 @@ impl<'a> Builder<'a> {
         self.parts.push(Vec::new());
     }
 
-    /// Makes a link the body that it is, unless what is fixed to it has become a part of that before.
+    /// Makes a link the body that it is, unless what is fixed to it has become a part of that
+    /// before.
     fn add_body(&mut self, k: usize) {
         let body = self.links.iter().position(|&link| link == k).unwrap_or_else(|| {
             self.new_body(k, self.places[k].pose);

@@ -10,8 +10,8 @@ use tesdf_sim::record::{InterruptedRun, RUN_VERSION, RecordError, RunJournal, Ru
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{Dynamics, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};
 
-/// A wedge falls onto a floor and a brick, and a door swings. The criterion follows it as a screw, although it is not
-/// one.
+/// A wedge falls onto a floor and a brick, and a door swings. The criterion follows it as a screw,
+/// although it is not one.
 const SCENE: &str = r#"
 time_step = 2e-3
 duration = 0.06

@@ -245,8 +245,8 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_a_cure() {
     assert!(told.contains("a robot description; give it a scene: [[robots]]"), "{told}");
 }
 
-/// A free base with an arm: a class of defaults, an include, masses of geoms, and a mesh that is moved
-/// and turned.
+/// A free base with an arm: a class of defaults, an include, masses of geoms, and a mesh that is
+/// moved and turned.
 const MJCF: &str = r#"<mujoco model="m"><compiler angle="degree" meshdir="meshes"/>
   <default><default class="arm"><joint damping="0.5" armature="0.01" range="-90 45"/><geom friction="0.7 0 0" density="500"/></default></default>
   <include file="assets.xml"/>
@@ -316,8 +316,8 @@ fn an_mjcf_file_gives_bodies_joints_and_masses_of_geoms() {
     assert!((low + 90.0).abs() < 1e-12 && (high - 45.0).abs() < 1e-12);
     assert_eq!(joint("body3").limits, Some([-0.1, 0.1]));
     assert_eq!(joint("socket").parent, None);
-    // The tip: less (1, 0, 0), turned back by 90° about z, a tenth: its corner at (1, 0, 0) is at the
-    // origin, that at (0, 0, 0) at (0, 0.1, 0).
+    // The tip: less (1, 0, 0), turned back by 90° about z, a tenth: its corner at (1, 0, 0) is at
+    // the origin, that at (0, 0, 0) at (0, 0.1, 0).
     let part = &section("body3").parts[0];
     let turn = tesdf::glam::DQuat::from_array(part.rotation);
     let at = |p: DVec3| turn * (DVec3::from_array(part.scale) * p) + DVec3::from_array(part.translation);

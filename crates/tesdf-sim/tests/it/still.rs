@@ -1,4 +1,5 @@
-//! Bodies at rest stay bit for bit also where nothing sleeps, and move as soon as something acts on them.
+//! Bodies at rest stay bit for bit also where nothing sleeps, and move as soon as something acts on
+//! them.
 use tesdf::glam::DVec3;
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::LoadedScene;
@@ -10,7 +11,8 @@ const STEP: f64 = 5e-3;
 /// Steps after which a step begins without the forces of the last one.
 const FORGETS: usize = 16;
 
-/// Boxes of side 0.1 m and 1 kg on a plane, `stacks` times `boxes` on each other, which never sleep.
+/// Boxes of side 0.1 m and 1 kg on a plane, `stacks` times `boxes` on each other, which never
+/// sleep.
 fn stacks(stacks: usize, boxes: usize, friction: f64) -> Newton {
     let body = |k: usize| {
         let [x, z] = [k / boxes, k % boxes].map(|k| k as f64);

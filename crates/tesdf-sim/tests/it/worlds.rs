@@ -6,8 +6,8 @@ use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{Drive, Dynamics, DynamicsError, Mass, MassProperties, Motor, State, World, Worlds, Wrench};
 
-/// A stack that falls asleep, a door with a motor, a pendulum of two links, two balls with restitution,
-/// two boxes that overlap deeply, and a plate that a script moves.
+/// A stack that falls asleep, a door with a motor, a pendulum of two links, two balls with
+/// restitution, two boxes that overlap deeply, and a plate that a script moves.
 const ALL: &str = r#"
 time_step = 5e-3
 duration = 1

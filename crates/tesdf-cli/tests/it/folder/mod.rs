@@ -57,8 +57,8 @@ pub fn texts(out: Output) -> (Option<i32>, String, String) {
     (out.status.code(), text(out.stdout), text(out.stderr))
 }
 
-/// Waits until a process catches Ctrl-C. Without the handler the signal would end the process, which
-/// would test nothing.
+/// Waits until a process catches Ctrl-C. Without the handler the signal would end the process,
+/// which would test nothing.
 #[cfg(target_os = "linux")]
 pub fn wait_for_handler(child: &Child) {
     let catches = || {

@@ -338,8 +338,8 @@ const BENT: f64 = 0.25;
 const MAX_ADDED: usize = 16;
 
 /// The edge of a triangle along which the distance to a face that bounds the depth where it can be
-/// greatest bends most: there the bound, which is linear between the corners, lies highest above it.
-/// `None` where it bends nowhere by much.
+/// greatest bends most: there the bound, which is linear between the corners, lies highest above
+/// it. `None` where it bends nowhere by much.
 ///
 /// The deepest points of parallel prisms are a whole line. Halves of the longest edge would be as
 /// short along this line as they have to be across it.

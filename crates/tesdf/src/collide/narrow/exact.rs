@@ -27,8 +27,8 @@ const SUNK: f64 = 1.0 / 16.0;
 /// when it is above `reach`.
 ///
 /// Outside the solid it is the least distance between the polygon and a face, in closed form.
-/// Inside, the depth is a minimum of convex functions, and a best-first search finds its maximum. It
-/// uses that the field is 1-Lipschitz, and that the distance to one face is convex, so over a
+/// Inside, the depth is a minimum of convex functions, and a best-first search finds its maximum.
+/// It uses that the field is 1-Lipschitz, and that the distance to one face is convex, so over a
 /// triangle it is at most its greatest value at a corner.
 ///
 /// Where the sign jumps, [`jump::lowest`](super::jump::lowest) is for it.
