@@ -608,7 +608,8 @@ impl Simulation {
     /// Current velocities [B, 6], vx vy vz wx wy wz: of the centre of mass, and angular.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let velocities: Vec<_> = self.read(py, |r| rows_of(r.states()).map(|(_, velocity)| velocity).collect());
+        let velocities: Vec<_> =
+            self.read(py, |r| rows_of(r.states()).map(|(_, velocity)| velocity).collect());
         let bodies = velocities.len();
         shaped(py, velocities.into_flattened(), [bodies, 6])
     }

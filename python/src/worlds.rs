@@ -479,7 +479,8 @@ impl Worlds {
     fn net_contact_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let [bodies, _] = self.counts(py);
         self.numbers(py, &[bodies, 3], |world, to| {
-            let sums = forces_of(world).map_or_else(|| vec![DVec3::ZERO; bodies], |forces| forces.on_each(bodies));
+            let sums =
+                forces_of(world).map_or_else(|| vec![DVec3::ZERO; bodies], |forces| forces.on_each(bodies));
             to.extend(sums.iter().flat_map(DVec3::to_array));
         })
     }
