@@ -43,11 +43,8 @@ fn over_plane(part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool 
     if is_triangle && part.normal == DVec3::ZERO {
         return false;
     }
-    // The search looks at the centre, too. Where a part is flat on the plane, that may be lower by
-    // rounding.
-    let center = (points[0] + points[1] + points[points.len() - 1]) / 3.0;
     let lower = |p: DVec3, q: DVec3| if q.z < p.z { q } else { p };
-    let lowest = points[1..].iter().chain([&center]).fold(points[0], |p, q| lower(p, *q));
+    let lowest = points[1..].iter().fold(points[0], |p, q| lower(p, *q));
     // The extremes of a triangle are where the plane opposes it.
     let has_extremes = !is_triangle || part.normal.z < OPPOSES;
     // The search moves a corner that is out of reach inwards.

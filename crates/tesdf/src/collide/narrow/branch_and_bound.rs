@@ -11,7 +11,7 @@ use crate::collide::bodies::field::{CellField, ROUNDING};
 use crate::collide::bodies::polygon::{MAX_VERTICES, Polygon};
 use crate::collide::scene::field_value::FieldValue;
 use crate::collide::search::depth_bounds::{Bound, DepthBounds, Kind};
-use crate::collide::search::greatest_minimum::{summit, value};
+use crate::collide::search::greatest_minimum::value;
 use crate::collide::search::longest_edge::longest_edge;
 use crate::collide::search::queue::Queue;
 use crate::geometry::Triangle;
@@ -113,10 +113,7 @@ impl<'a> Branches<'a> {
     /// lower bound.
     pub fn value(&mut self, p: DVec3) -> FieldValue {
         self.evaluations += 1;
-        if self.precision == Precision::F64
-            && self.slack.is_finite()
-            && !matches!(self.cell, CellField::Simple(_))
-        {
+        if self.precision == Precision::F64 && self.slack.is_finite() {
             let rough = self.cell.value(p, Precision::F32);
             let distance = rough.distance - self.slack;
             if distance >= self.best.0 {
@@ -279,17 +276,8 @@ impl<'a> Branches<'a> {
                     }
                 }
             }
-            // A convex function lies above its tangents.
-            CellField::Simple(_) => {
-                let tangent =
-                    |v: &FieldValue, from: DVec3| points.map(|p| -(v.distance + v.gradient.dot(p - from)));
-                let [u, v, w] = corners.map(|c| tangent(&c.value, c.point));
-                let (depth, at) = summit(&[tangent(&value, center), u, v, w]);
-                bound = bound.max(-depth);
-                if self.is_open(bound) {
-                    self.value(at[0] * points[0] + at[1] * points[1] + at[2] * points[2]);
-                }
-            }
+            // Their lowest points have a closed form.
+            CellField::Simple(_) => {}
         }
         BoundedTriangle { bound, corners, center: value, edge: edge.unwrap_or_else(|| longest_edge(points)) }
     }

@@ -4,6 +4,7 @@ use glam::DVec3;
 use super::Lowest;
 use super::branch_and_bound::{self, branch_and_bound};
 use super::deepest::{deepest, has_bounds_by_planes};
+use super::simple_shape;
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
@@ -40,6 +41,15 @@ pub fn lowest(
     reach: f64,
     precision: Precision,
 ) -> Option<Lowest> {
+    if let CellField::Simple(simple) = *cell {
+        let points: ArrayVec<DVec3, MAX_VERTICES> = polygon.points().collect();
+        let point = simple_shape::lowest(simple, &points);
+        return (simple.value(point).distance <= reach).then_some(Lowest {
+            point,
+            converged: true,
+            face: None,
+        });
+    }
     let center = polygon.center();
     let radius = polygon.reach(center);
     let first = match cell {
@@ -51,9 +61,7 @@ pub fn lowest(
         return None;
     }
     let none = Faces::default();
-    let Some((asset, place, faces)) = cell.mesh(&none) else {
-        return Some(lowest_inside(cell, polygon, normal, (tolerance, reach), precision));
-    };
+    let (asset, place, faces) = cell.mesh(&none)?;
     // No point of the surface is nearer to the centre than the first distance.
     let clear = radius + ROUNDING;
     let (inside, crossing) = match (cell, place) {
