@@ -20,10 +20,7 @@ impl<'py> Rows<'py> {
     /// # Errors
     /// `ValueError` names the argument and the shape that was found.
     pub fn new(name: &str, any: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let py = any.py();
-        static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-        let require = REQUIRE.import(py, "numpy", "require")?;
-        let array = require.call1((on_host(any)?, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
+        let array = floats(name, any)?;
         match array.extract::<PyReadonlyArray2<'py, f64>>() {
             Ok(rows) if rows.shape()[1] == 3 => Ok(Self(rows)),
             _ => {
@@ -37,6 +34,23 @@ impl<'py> Rows<'py> {
     pub fn as_slice(&self) -> PyResult<&[DVec3]> {
         Ok(bytemuck::cast_slice(self.0.as_slice()?))
     }
+}
+
+/// A contiguous array `float64`, in place where the object is one.
+///
+/// # Errors
+/// `ValueError` for complex numbers, truth values, text and times, which numpy would convert, too.
+pub fn floats<'py>(name: &str, any: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = any.py();
+    static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let array = ASARRAY.import(py, "numpy", "asarray")?.call1((on_host(any)?,))?;
+    let dtype = array.cast::<PyUntypedArray>()?.dtype();
+    if !matches!(dtype.kind(), b'f' | b'i' | b'u' | b'O') {
+        return Err(argument(name, format!("an array of {dtype}"), "real numbers"));
+    }
+    static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let require = REQUIRE.import(py, "numpy", "require")?;
+    require.call1((array, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))
 }
 
 /// An object that numpy converts: the array of an object that has its memory by DLPack alone, and

@@ -120,7 +120,7 @@ impl Asset {
     /// The file must not be changed in place while the asset exists; replacing it, as save does, is
     /// safe. Raises OSError if the file cannot be read, and AssetError if it is not an asset.
     #[staticmethod]
-    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    pub fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let opened = py.detach(|| TeSdf::open(&path));
         opened.map(Self::new).map_err(|e| Error::Asset(Some(path), e).raise(py))
     }
@@ -428,6 +428,11 @@ impl Asset {
             self.inner.face_count(),
             self.inner.as_bytes().len()
         )
+    }
+
+    /// A section of its distances and its figures, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("tesdf._html")?.call_method1("of_asset", (slf,))
     }
 
     /// Supports pickling through the bytes of the file.

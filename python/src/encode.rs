@@ -19,8 +19,7 @@ use crate::pool;
 /// Encodes a closed mesh. Ctrl-C ends it with KeyboardInterrupt.
 ///
 /// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with
-///   usd-core), a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these
-///   names.
+///   usd-core), a pair (vertices [V, 3], faces [F, 3]), or a mesh of trimesh, Open3D or pyvista.
 /// - preset: "default" (fast queries), "fast" (fast encoding), "compact" (small) or "gpu" (few
 ///   cells, whose lists fill the 32 threads of a GPU that read them), all exact; "paper" (the
 ///   paper's encoder: sampled, 129 samples along an edge, plain) or "sampled-safe" (sampled with a
@@ -55,7 +54,7 @@ use crate::pool;
 ///   these that makes it encodable, duplicates and T-junctions and orientation, welding of cracks,
 ///   filling of holes. The asset records what was changed (asset.source.repair). None refuses such
 ///   a mesh.
-/// - threads: number of threads; None is one per core. The bytes of the asset do not depend on it.
+/// - threads: number of threads, at most 256; None is one per core. The bytes of the asset do not depend on it.
 /// - progress: called with the stage ("refine", "tighten", "assemble") and the completed fraction
 ///   of it, 0 to 1, about twenty times a second. An exception from it ends the encoding and is
 ///   raised.
@@ -65,13 +64,13 @@ use crate::pool;
 /// mesh, options exclude each other, Gmsh fails, or the tetrahedra do not conform to the mesh.
 #[pyfunction]
 #[pyo3(
-    signature = (mesh, preset = "default", **options),
+    signature = (mesh, preset = None, **options),
     text_signature = "(mesh, preset='default', *, domain=None, encoder=None, resolution=None, threshold=None, e_max=None, deformable=False, plain=False, band=None, regions=None, unit=None, inside='winding', thickness=None, surface='all', repair=None, threads=None, progress=None)"
 )]
 pub fn encode(
     py: Python<'_>,
     mesh: &Bound<'_, PyAny>,
-    preset: &str,
+    preset: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Asset> {
     let Keywords { choices, repair, threads, progress } = Keywords::new(preset, options)?;
@@ -131,9 +130,15 @@ impl<'py> Keywords<'py> {
     /// # Errors
     /// `TypeError` for an unknown keyword and a value of another type, `ValueError` for an unknown
     /// name.
-    fn new(preset: &str, keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Self> {
+    fn new(preset: Option<&Bound<'py, PyAny>>, keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Self> {
         let mut found = Self::default();
-        found.choices.preset = chosen("preset", preset)?;
+        if let Some(preset) = preset {
+            let name = preset.cast::<PyString>().map_err(|_| {
+                let expected = "the name of a preset; arrays are one argument: encode((vertices, faces))";
+                PyTypeError::new_err(format!("preset: {}; expected {expected}", kind_of(preset)))
+            })?;
+            found.choices.preset = chosen("preset", &name.to_cow()?)?;
+        }
         for (name, value) in keywords.into_iter().flatten() {
             let name: String = name.extract()?;
             found.set(&name, &value)?;

@@ -21,6 +21,7 @@ use tesdf_sim::scene_file::SceneError;
 use tesdf_sim::{DynamicsError, MassError, SimulateError};
 
 use crate::classes::{self, Checked};
+use crate::wording::in_python;
 
 /// Errors that occur while the interpreter's lock is released.
 #[derive(Debug)]
@@ -115,8 +116,13 @@ impl Error {
         }
     }
 
-    /// The library's message, with the path of the file in front if the message does not have it.
+    /// The message in Python's terms.
     fn text(&self) -> String {
+        in_python(&self.message())
+    }
+
+    /// The library's message, with the path of the file in front if the message does not have it.
+    fn message(&self) -> String {
         let at = |path: &Option<PathBuf>, e: &dyn std::fmt::Display| match path {
             Some(path) => format!("{}: {e}", path.display()),
             None => e.to_string(),
@@ -138,7 +144,7 @@ impl Error {
             Self::Scene(e) => e.to_string(),
             Self::Simulate(e) => e.to_string(),
             Self::Dynamics(e) => e.to_string(),
-            Self::World(world, e) => format!("world {world}: {}", e.text()),
+            Self::World(world, e) => format!("world {world}: {}", e.message()),
             Self::Mass(body, e) => format!("body {body}: {e}"),
             Self::NoHistory => {
                 "the simulation keeps no history; make it with history=True, the default".into()

@@ -15,6 +15,7 @@ mod errors;
 mod forces;
 mod instance_columns;
 mod interrupt;
+mod kept_assets;
 mod kept_pairs;
 mod mesh;
 mod mujoco;
@@ -30,6 +31,7 @@ mod settings;
 mod shapes;
 mod simulation;
 mod why_report;
+mod wording;
 mod worlds;
 
 /// The compiled part of the package `tesdf`.
@@ -41,6 +43,8 @@ mod _native {
     use super::device::{DeviceArray, devices};
     #[pymodule_export]
     use super::encode::encode;
+    #[pymodule_export]
+    use super::kept_assets::asset_of;
     #[pymodule_export]
     use super::kept_pairs::InstancePairs;
     #[pymodule_export]

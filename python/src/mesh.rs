@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyString, PyTuple};
 use serde::Serialize;
 use tesdf::asset::about::Source;
 use tesdf::base::Inside;
@@ -38,13 +38,13 @@ pub struct Loaded {
 }
 
 impl MeshInput {
-    /// Converts a path, an object with `vertices` and `faces`, or a pair of these arrays.
+    /// Converts a path, a mesh of another package, or a pair (vertices, faces).
     ///
     /// # Errors
     /// `TypeError` or `ValueError` with what was found; `MeshError` with the face or vertex at
     /// fault.
     pub fn new(any: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if any.is_instance_of::<PyString>() || any.hasattr("__fspath__")? {
+        if is_path(any)? {
             let path: PathBuf = any.extract()?;
             let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
             if USD.contains(&extension.as_str()) {
@@ -52,12 +52,12 @@ impl MeshInput {
             }
             return Ok(Self::File(path));
         }
-        let [vertices, faces] = if any.hasattr("vertices")? && any.hasattr("faces")? {
-            [any.getattr("vertices")?, any.getattr("faces")?]
-        } else {
-            any.extract::<[Bound<'_, PyAny>; 2]>().map_err(|_| {
-                argument("mesh", kind_of(any), "a path, a pair (vertices, faces), or an object that has both")
-            })?
+        let [vertices, faces] = match arrays_of(any)? {
+            Some(arrays) => arrays,
+            None => any.extract::<[Bound<'_, PyAny>; 2]>().map_err(|_| {
+                let expected = "a path, a pair (vertices, faces), or a mesh of trimesh, Open3D or pyvista";
+                argument("mesh", kind_of(any), expected)
+            })?,
         };
         let vertices = Rows::new("vertices", &vertices)?.as_slice()?.to_vec();
         let faces = corner_ids(&faces)?;
@@ -116,6 +116,38 @@ impl Loaded {
     }
 }
 
+/// Whether an argument is a path.
+pub fn is_path(any: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(any.is_instance_of::<PyString>() || any.hasattr("__fspath__")?)
+}
+
+/// Whether an argument that may be of other kinds, too, is to be read as a mesh.
+pub fn is_mesh(any: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let is_pair = any.cast::<PyTuple>().is_ok_and(|pair| pair.len() == 2);
+    Ok(is_pair || is_path(any)? || arrays_of(any)?.is_some())
+}
+
+/// The vertices and faces of an object, by the names of trimesh and others, Open3D and pyvista.
+fn arrays_of<'py>(any: &Bound<'py, PyAny>) -> PyResult<Option<[Bound<'py, PyAny>; 2]>> {
+    let both = |of: &Bound<'py, PyAny>, vertices, faces| match of.hasattr(vertices)? && of.hasattr(faces)? {
+        true => Ok(Some([of.getattr(vertices)?, of.getattr(faces)?])),
+        false => PyResult::Ok(None),
+    };
+    for faces in ["faces", "triangles"] {
+        if let Some(arrays) = both(any, "vertices", faces)? {
+            return Ok(Some(arrays));
+        }
+    }
+    // Meshes of Open3D's tensors.
+    if let Some([vertex, triangle]) = both(any, "vertex", "triangle")? {
+        return Ok(Some([vertex.getattr("positions")?, triangle.getattr("indices")?]));
+    }
+    if any.hasattr("points")? && any.hasattr("triangulate")? {
+        return both(&any.call_method0("triangulate")?, "points", "regular_faces");
+    }
+    Ok(None)
+}
+
 /// Converts the vertex ids of faces from an array of shape `[F, 3]` of any integer type.
 fn corner_ids(any: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
     let ids = arrays::integers("faces", any, "shape (F, 3)", |shape| matches!(shape, [_, 3]))?;
@@ -145,7 +177,7 @@ struct Mended<'a> {
 /// unintended.
 ///
 /// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with
-/// usd-core), a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these names.
+/// usd-core), a pair (vertices [V, 3], faces [F, 3]), or a mesh of trimesh, Open3D or pyvista.
 ///
 /// Raises OSError or MeshError if the mesh cannot be read. Defects are in the report and raise
 /// nothing.

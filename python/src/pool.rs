@@ -28,11 +28,14 @@ pub fn shared() -> Result<Arc<ThreadPool>, Error> {
     }
 }
 
-/// A new pool with this number of threads, or the shared pool.
+/// Largest number of threads of a pool; more cost memory and gain nothing.
+const LARGEST: usize = 256;
+
+/// A new pool with this number of threads, or 256 where it is larger, or the shared pool.
 pub fn of(threads: Option<NonZeroUsize>) -> Result<Arc<ThreadPool>, Error> {
     match threads {
         Some(threads) => {
-            let pool = ThreadPoolBuilder::new().num_threads(threads.get()).build();
+            let pool = ThreadPoolBuilder::new().num_threads(threads.get().min(LARGEST)).build();
             pool.map(Arc::new).map_err(Error::Threads)
         }
         None => shared(),

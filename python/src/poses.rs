@@ -1,7 +1,6 @@
 //! Poses, velocities and motions from numpy arrays.
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::sync::PyOnceLock;
 use tesdf::collide::{CollideError, Motion, Pose, Velocity};
 use tesdf::glam::{DMat3, DQuat, DVec3};
 
@@ -26,7 +25,7 @@ const UNIT: f64 = 1e-6;
 /// # Errors
 /// `ValueError` for other shapes; `CollideError` names the row that is not a pose.
 pub fn poses(name: &str, any: &Bound<'_, PyAny>, count: Count) -> PyResult<Vec<Pose>> {
-    let array = floats(any)?;
+    let array = floats(name, any)?;
     let numbers = array.as_slice()?;
     let found: Vec<Result<Pose, CollideError>> = match (count, array.shape()) {
         (Count::One, [7]) | (Count::Rows, [_, 7]) => rows(numbers).map(of_quaternion).collect(),
@@ -58,7 +57,7 @@ pub fn pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<[f64; 7]> {
 /// # Errors
 /// `ValueError` for other shapes.
 pub fn velocities(name: &str, any: &Bound<'_, PyAny>, count: Count) -> PyResult<Vec<Velocity>> {
-    let array = floats(any)?;
+    let array = floats(name, any)?;
     match (count, array.shape()) {
         (Count::One, [6]) | (Count::Rows, [_, 6]) => Ok(rows(array.as_slice()?).map(of_twist).collect()),
         (Count::One, _) => Err(shape_error(name, &array, "shape (6,), vx vy vz wx wy wz")),
@@ -84,7 +83,7 @@ pub fn motion(
             Ok(velocities.first().map_or(Motion::Rest, |&velocity| Motion::Linear { velocity }))
         }
         (None, Some(screw)) => {
-            let array = floats(screw)?;
+            let array = floats(&format!("screw_{body}"), screw)?;
             let ([8], Some(screw)) = (array.shape(), rows(array.as_slice()?).next()) else {
                 let expected = "shape (8,), px py pz ax ay az omega pitch";
                 return Err(shape_error(&format!("screw_{body}"), &array, expected));
@@ -118,7 +117,7 @@ pub fn motions(
             return Err(argument(&format!("velocities_{body}"), found, "one of them"));
         }
     };
-    let array = floats(any)?;
+    let array = floats(&name, any)?;
     if array.shape() != [pairs, width] {
         return Err(shape_error(&name, &array, &format!("shape ({pairs}, {width}), a row for each pair")));
     }
@@ -134,7 +133,7 @@ pub fn motions(
 /// # Errors
 /// `ValueError` names the argument and the shape.
 pub fn numbers(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<f64>> {
-    let array = floats(any)?;
+    let array = floats(name, any)?;
     match *array.shape() {
         [] => Ok(vec![array.as_slice()?[0]; rows]),
         [n] if n == rows => Ok(array.as_slice()?.to_vec()),
@@ -147,14 +146,14 @@ pub fn numbers(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<
 /// # Errors
 /// As [`poses`].
 pub fn poses_of(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<Pose>> {
-    let shape = floats(any)?.shape().to_vec();
+    let shape = floats(name, any)?.shape().to_vec();
     match *shape {
         [7] | [4, 4] => Ok(vec![poses(name, any, Count::One)?[0]; rows]),
         [n, 7] | [n, 4, 4] if n == rows => poses(name, any, Count::Rows),
         _ => {
             let expected =
                 format!("shape (7,), x y z qx qy qz qw, or (4, 4), or ({rows}, …) with a row for each world");
-            Err(shape_error(name, &floats(any)?, &expected))
+            Err(shape_error(name, &floats(name, any)?, &expected))
         }
     }
 }
@@ -164,7 +163,7 @@ pub fn poses_of(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec
 /// # Errors
 /// `ValueError` names the argument and the shape.
 pub fn columns<const N: usize>(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<[f64; N]>> {
-    let array = floats(any)?;
+    let array = floats(name, any)?;
     let numbers = array.as_slice()?.as_chunks::<N>().0;
     let (one, each): (&[usize], Vec<usize>) = if N == 1 { (&[], vec![rows]) } else { (&[N], vec![rows, N]) };
     match array.shape() {
@@ -207,14 +206,12 @@ pub fn of_velocity(velocity: &Velocity) -> [f64; 6] {
     [v.x, v.y, v.z, w.x, w.y, w.z]
 }
 
-/// Any object that numpy can convert to `float64`.
-pub fn floats<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
-    let py = any.py();
-    static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    let require = REQUIRE.import(py, "numpy", "require")?;
-    let array =
-        require.call1((arrays::on_host(any)?, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
-    Ok(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?)
+/// An argument as an array `float64` of any shape.
+///
+/// # Errors
+/// As [`arrays::floats`].
+pub fn floats<'py>(name: &str, any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    Ok(arrays::floats(name, any)?.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?)
 }
 
 pub fn shape_error(name: &str, array: &PyReadonlyArrayDyn<'_, f64>, expected: &str) -> PyErr {

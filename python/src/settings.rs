@@ -142,7 +142,7 @@ fn of_bodies<const N: usize>(
     rows: usize,
     bodies: usize,
 ) -> PyResult<Vec<Vec<[f64; N]>>> {
-    let array = poses::floats(any)?;
+    let array = poses::floats(name, any)?;
     let numbers = array.as_slice()?.as_chunks::<N>().0;
     match *array.shape() {
         [b, n] if [b, n] == [bodies, N] => Ok(vec![numbers.to_vec(); rows]),

@@ -1,12 +1,14 @@
 //! Shapes of scenes: assets, and the classes of `tesdf.shapes`.
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyTuple, PyType};
+use pyo3::types::PyType;
 use tesdf::collide::Shape;
 use tesdf::glam::DVec3;
 
 use crate::asset::Asset;
 use crate::errors::{argument, kind_of};
+use crate::kept_assets::asset_of;
+use crate::mesh::is_mesh;
 
 /// The classes of the simple shapes, in `tesdf.shapes`.
 struct Classes<'a, 'py> {
@@ -28,8 +30,8 @@ fn classes(py: Python<'_>) -> PyResult<Classes<'_, '_>> {
     })
 }
 
-/// Converts an asset, an object of `tesdf.shapes`, or a mesh in memory, which is encoded. The
-/// library checks sizes.
+/// Converts an asset, an object of `tesdf.shapes`, or a mesh, which is encoded once. The library
+/// checks sizes.
 ///
 /// # Errors
 /// `ValueError` names the argument and what was found; those of `tesdf.encode`.
@@ -59,16 +61,14 @@ pub fn shape(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
     }
 }
 
-/// The asset of a pair (vertices, faces), or of an object that has both.
+/// The asset of a path or of a mesh in memory.
 fn encoded(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
-    let is_mesh = any.hasattr("vertices")? && any.hasattr("faces")?;
-    if !is_mesh && any.cast::<PyTuple>().map_or(true, |pair| pair.len() != 2) {
-        let expected = "an Asset, Plane, Box, Sphere or Capsule, or a mesh: (vertices, faces), or an object that has \
-                        both";
+    if !is_mesh(any)? {
+        let expected = "an Asset, Plane, Box, Sphere or Capsule, or a mesh: a path, (vertices, faces), or one of \
+                        trimesh, Open3D or pyvista";
         return Err(argument(name, kind_of(any), expected));
     }
-    let asset = any.py().import("tesdf._native")?.call_method1("encode", (any, "fast"))?;
-    Ok(asset.cast::<Asset>()?.get().shared().into())
+    Ok(asset_of(any)?.get().shared().into())
 }
 
 /// The Python object of a shape. An asset is shared, not copied.

@@ -1,5 +1,8 @@
 """Exact signed distances and contacts of triangle meshes, in numpy.
 
+    tesdf.signed_distance("part.stl", points)           # also contains, closest_point; the mesh is encoded once
+    tesdf.clearance("a.stl", "b.stl", pose_a, pose_b)   # exact, with witness points
+
     asset = tesdf.encode("part.stl")                    # a path, (vertices, faces), or a mesh
     answers = asset.query(points)                       # points [N, 3]
     answers.signed_distance, answers.gradient, answers.closest_point, answers.face
@@ -22,7 +25,6 @@
     scene.update(ids, poses=poses)                      # and so on
 
     tesdf.collide(asset, tesdf.Sphere(1.0), pose_b=pose)             # contacts of two bodies
-    tesdf.clearance(asset, asset, pose_b=pose).distance              # exact, with witness points
     tesdf.time_of_impact(asset, asset, pose_b=pose, velocity_b=velocity)
 
     scene.clearances(pairs).distance                    # of many pairs [P, 2]; times_of_impact
@@ -92,6 +94,7 @@ from .errors import (
     SimulationError,
 )
 from .playback import LiveView, export
+from .queries import closest_point, contains, signed_distance
 from .reports import (
     CheckReport,
     Clearance,
@@ -103,7 +106,7 @@ from .reports import (
     VerifyReport,
     WhyReport,
 )
-from .results import Answers, DeviceAnswers, Moved, RayHits, Reencoded, Repaired
+from .results import Answers, ClosestPoints, DeviceAnswers, Moved, RayHits, Reencoded, Repaired
 from .shapes import Box, Capsule, Plane, Sphere
 from .usd import UsdMesh, read_usd
 
@@ -118,6 +121,7 @@ __all__ = [
     "CheckReport",
     "Clearance",
     "Clearances",
+    "ClosestPoints",
     "CoarseContacts",
     "CollideError",
     "ContactForces",
@@ -165,12 +169,15 @@ __all__ = [
     "__version__",
     "check",
     "clearance",
+    "closest_point",
     "collide",
+    "contains",
     "devices",
     "encode",
     "export",
     "read_usd",
     "repair",
+    "signed_distance",
     "time_of_impact",
     "view",
     "why",

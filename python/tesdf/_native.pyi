@@ -5,7 +5,7 @@ from typing import Any, Literal, Protocol, Union, final, overload
 import numpy as np
 import numpy.typing as npt
 
-from .bodies import Body, HasMesh, Shape
+from .bodies import Body, Mesh, Shape
 from .contacts import (
     Clearances,
     CoarseContacts,
@@ -47,7 +47,6 @@ class _ContactParameters(Protocol):
     def solimp(self) -> npt.NDArray[Any]: ...
 
 _Path = Union[str, PathLike[str]]
-_Mesh = Union[_Path, tuple[npt.ArrayLike, npt.ArrayLike], HasMesh]
 _Precision = Literal["f64", "f32"]
 _Numbers = Union[float, npt.ArrayLike]
 _Integers = Union[int, npt.ArrayLike]
@@ -66,6 +65,7 @@ __all__ = [
     "Snapshot",
     "Worlds",
     "__version__",
+    "asset_of",
     "check",
     "contact_frames",
     "devices",
@@ -87,7 +87,8 @@ def polygons(
     points: npt.ArrayLike, counts: npt.ArrayLike, corners: npt.ArrayLike
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32], tuple[str, ...]]: ...
 def pose(name: str, pose: npt.ArrayLike) -> list[float]: ...
-def check(mesh: _Mesh) -> CheckReport: ...
+def asset_of(mesh: Mesh) -> Asset: ...
+def check(mesh: Mesh) -> CheckReport: ...
 def contact_frames(normals: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
 def fill_mujoco_contacts(
     fields: Any,
@@ -98,14 +99,14 @@ def fill_mujoco_contacts(
 ) -> None: ...
 def devices() -> list[Device]: ...
 def repair(
-    mesh: _Mesh,
+    mesh: Mesh,
     *,
     weld_tolerance: float | Literal["auto"] | None = None,
     orient: bool = False,
     fill_holes: bool | int | None = None,
 ) -> Repaired: ...
 def encode(
-    mesh: _Mesh,
+    mesh: Mesh,
     preset: Literal["default", "fast", "compact", "gpu", "paper", "sampled-safe"] = "default",
     *,
     domain: Literal["bisection", "gmsh"] | _Path | None = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypedDict, Union
 
 from . import _native
@@ -13,17 +14,31 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from typing_extensions import Unpack
 
-class HasMesh(Protocol):
-    """A mesh, such as one of trimesh."""
+class HasVertices(Protocol):
+    """A mesh, such as one of trimesh (with `faces`) or Open3D (with `triangles`)."""
 
     @property
     def vertices(self) -> Any: ...
+
+
+class HasPoints(Protocol):
+    """A mesh of pyvista."""
+
     @property
-    def faces(self) -> Any: ...
+    def points(self) -> Any: ...
 
 
+class HasVertex(Protocol):
+    """A mesh of Open3D's tensors."""
+
+    @property
+    def vertex(self) -> Any: ...
+
+
+HasMesh = Union[HasVertices, HasPoints, HasVertex]
+Mesh = Union["_native.Asset", str, "PathLike[str]", tuple["npt.ArrayLike", "npt.ArrayLike"], HasMesh]
 Shape = Union["_native.Asset", Plane, Box, Sphere, Capsule]
-Body = Union[Shape, tuple["npt.ArrayLike", "npt.ArrayLike"], HasMesh]
+Body = Union[Shape, Mesh]
 
 
 class WhyOptions(TypedDict, total=False):
@@ -58,9 +73,9 @@ def collide(
 ) -> Contacts:
     """The contacts of two bodies, as the instances 0 and 1. As `tesdf collide A B`.
 
-    A body is an `Asset`, `Plane`, `Box`, `Sphere` or `Capsule`, or a mesh in memory, (vertices, faces) or
-    an object that has both, which is encoded with the preset "fast". Its pose has seven numbers, x y z
-    qx qy qz qw, or is a matrix [4, 4]; None is the identity. `Scene.detect` explains the options.
+    A body is a `Plane`, `Box`, `Sphere` or `Capsule`, or a mesh as `signed_distance` takes it, which is
+    encoded once. Its pose has seven numbers, x y z qx qy qz qw, or is a matrix [4, 4]; None is the
+    identity. `Scene.detect` explains the options.
     """
     return _native.pair(a, b, pose_a, pose_b).detect(**options)
 
@@ -68,9 +83,9 @@ def collide(
 def clearance(
     a: Body,
     b: Body,
-    *,
     pose_a: npt.ArrayLike | None = None,
     pose_b: npt.ArrayLike | None = None,
+    *,
     tolerance: float | None = None,
 ) -> Clearance:
     """The signed distance between the surfaces of two bodies, with witness points.

@@ -1,18 +1,26 @@
 """Contacts and instances as arrays: one array for each field, and a row for each contact or
 instance. `len` is the number of rows.
 
+Where all arrays have these rows, `contacts[0]` is a named tuple of one row, `contacts[mask]` has some of
+them, and `for contact in contacts` goes over them. `to_dict()` and `to_dataframe()` have a column for
+each number.
+
 Points, normals and lengths are in the frame and unit of the world.
 """
 
 from __future__ import annotations
 
+import collections
 import dataclasses
+import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from . import _html
 from .reports import DetectionStatistics
 
 if TYPE_CHECKING:
@@ -31,8 +39,68 @@ class _Rows:
         return f"<tesdf.{type(self).__name__}: {len(self)} rows>"
 
 
+class _Table(_Rows):
+    """All arrays have the same number of rows."""
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The arrays with a value for each row, by name, as for `numpy.savez`."""
+        fields = (field.name for field in dataclasses.fields(self))  # type: ignore[arg-type]
+        named = {name: getattr(self, name) for name in fields}
+        return {name: array for name, array in named.items() if isinstance(array, np.ndarray)}
+
+    def __getitem__(self, rows: Any) -> Any:
+        """A named tuple of one row for an integer; for a slice, a mask or integers, these rows. What
+        does not belong to a row, such as `statistics`, stays that of all."""
+        arrays = self.arrays()
+        if isinstance(rows, (int, np.integer)):
+            return _row_class(type(self).__name__, tuple(arrays))(*(array[rows] for array in arrays.values()))
+        rows = rows if isinstance(rows, slice) else np.asarray(rows)
+        if not isinstance(rows, slice) and rows.size == 0 and rows.dtype.kind == "f":
+            rows = rows.astype(int)  # numpy's type for an empty list
+        chosen = {name: array[rows] for name, array in arrays.items()}
+        return dataclasses.replace(self, **chosen)  # type: ignore[type-var]
+
+    def __iter__(self) -> Iterator[Any]:
+        row = _row_class(type(self).__name__, tuple(self.arrays()))
+        return map(row._make, zip(*self.arrays().values()))
+
+    def to_dict(self) -> dict[str, npt.NDArray[Any]]:
+        """A column for each number of a row: `point_a_x`, `point_a_y`, `point_a_z`, `distance`, ….
+        `pandas.DataFrame` and `polars.DataFrame` take it."""
+        columns = {}
+        for name, array in self.arrays().items():
+            if array.ndim == 1:
+                columns[name] = array
+                continue
+            ends = _ENDS.get(array.shape[1], tuple(map(str, range(array.shape[1]))))
+            columns.update({f"{name}_{end}": array[:, k] for k, end in enumerate(ends)})
+        return columns
+
+    def to_dataframe(self) -> Any:
+        """The columns of `to_dict` as a `pandas.DataFrame`; needs pandas."""
+        import pandas
+
+        return pandas.DataFrame(self.to_dict())
+
+    def _repr_html_(self) -> str:
+        return _html.of_rows(self)
+
+
+# Names of the numbers of vectors, poses and velocities.
+_ENDS = {
+    3: ("x", "y", "z"),
+    6: ("vx", "vy", "vz", "wx", "wy", "wz"),
+    7: ("x", "y", "z", "qx", "qy", "qz", "qw"),
+}
+
+
+@functools.cache
+def _row_class(table: str, names: tuple[str, ...]) -> Any:
+    return collections.namedtuple(f"{table}Row", names)  # type: ignore[misc]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Instances(_Rows):
+class Instances(_Table):
     """The states of the instances of a scene, in the order of their ids."""
 
     ids: _Id
@@ -54,7 +122,7 @@ class Instances(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Reductions(_Rows):
+class Reductions(_Table):
     """The loss from the reduction, a row for each pair of instances that touches.
 
     Take any normal forces on all contacts of a pair, with total size F. Normal forces on the kept
@@ -82,7 +150,7 @@ class Reductions(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HiddenOverlaps(_Rows):
+class HiddenOverlaps(_Table):
     """Pairs of instances that overlap without a contact that shows it."""
 
     instance_a: _Id
@@ -94,7 +162,7 @@ class HiddenOverlaps(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CoarseContacts(_Rows):
+class CoarseContacts(_Table):
     """Faces that touch and that are large against the other body: the mode "node" can miss where
     they touch."""
 
@@ -111,7 +179,7 @@ class CoarseContacts(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Clearances(_Rows):
+class Clearances(_Table):
     """Signed distances of pairs of bodies, a row for each pair. `tesdf.Clearance` says more."""
 
     instance_a: _Id
@@ -196,7 +264,7 @@ class ContactPatches(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactRows(_Rows):
+class ContactRows(_Table):
     """Arrays with a row for each contact.
 
     In each contact, *a* is the body that has the face or vertex, and *b* is the body whose
@@ -234,12 +302,6 @@ class ContactRows(_Rows):
     converged: npt.NDArray[np.bool_]
     """[N] whether it is proved that no point of the face is deeper by more than the tolerance"""
 
-    def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """The arrays with a row for each contact, by name, as for `numpy.savez`."""
-        fields = (field.name for field in dataclasses.fields(self))
-        named = {name: getattr(self, name) for name in fields}
-        return {name: array for name, array in named.items() if isinstance(array, np.ndarray)}
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contacts(ContactRows):
@@ -259,7 +321,7 @@ class Contacts(ContactRows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TouchingFeatures(_Rows):
+class TouchingFeatures(_Table):
     """The vertices, edges or faces of two bodies that touch, a row for each contact:
     `Scene.touching_features`."""
 
@@ -305,7 +367,7 @@ class StepContacts(ContactRows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactForces(_Rows):
+class ContactForces(_Table):
     """The forces between bodies at the contacts of a step, each the mean over the step."""
 
     bodies: _Id
@@ -331,7 +393,7 @@ class ContactForces(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JointForces(_Rows):
+class JointForces(_Table):
     """What each of J joints did to its child in a step, as the mean over the step. To its parent, it
     did the opposite."""
 

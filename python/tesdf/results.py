@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,18 @@ class Answers(NamedTuple):
     """[N, 3] nearest point on the surface"""
     face: npt.NDArray[np.uint32]
     """[N] id of the nearest face in the source mesh"""
+
+
+class ClosestPoints(NamedTuple):
+    """The points of a mesh that are closest to given ones, in the mesh's unit. Of one point, `face`
+    and `distance` are numbers. A point that is not finite has NaN and `NO_FACE`."""
+
+    point: npt.NDArray[np.float64]
+    """[..., 3] nearest point on the surface"""
+    face: Any
+    """[...] id of its face in the source mesh"""
+    distance: Any
+    """[...] distance to it, 0 or more"""
 
 
 class DeviceAnswers(NamedTuple):

@@ -339,8 +339,8 @@ def test_bodies_of_two_functions(asset, torus):
         tesdf.collide(asset, tesdf.encode(torus, "fast", unit="mm"))
     with pytest.raises(tesdf.CollideError, match="pose_b: not a pose"):
         tesdf.collide(asset, asset, pose_b=[0] * 7)
-    with pytest.raises(ValueError, match="a: str; expected an Asset"):
-        tesdf.clearance("torus.tesdf", asset)
+    with pytest.raises(ValueError, match="a: int; expected an Asset"):
+        tesdf.clearance(17, asset)
     on_floor = tesdf.collide(tesdf.Sphere(1), tesdf.Plane(), pose_a=[0, 0, 0.75, 0, 0, 0, 1])
     assert set(on_floor.distance) == {-0.25} and set(on_floor.tet_b) == {tesdf.NO_CELL}
     assert on_floor.normal[on_floor.instance_b == 1].tolist() == [[0, 0, 1]]

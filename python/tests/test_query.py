@@ -95,7 +95,7 @@ def test_points_that_are_not_finite(asset):
     ([1.0, 2.0, 3.0], r"points: an array of shape \(3,\); expected shape \(N, 3\)"),
     (np.zeros((4, 2)), r"points: an array of shape \(4, 2\)"),
     (np.zeros((2, 4, 3)), r"points: an array of shape \(2, 4, 3\)"),
-    ([["a", "b", "c"]], "could not convert"),
+    ([["a", "b", "c"]], "points: an array of <U1; expected real numbers"),
 ])
 def test_invalid_points_are_errors(asset, bad, text):
     with pytest.raises(ValueError, match=text):

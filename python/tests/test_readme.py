@@ -30,7 +30,7 @@ def run(torus, tmp_path, monkeypatch):
 
 
 def test_the_code_of_the_package_runs(run):
-    names = run(PYTHON / "README.md", 6)
+    names = run(PYTHON / "README.md", 7)
     assert names["summary"]["passed"] and Path("run.tesrun").exists()
     assert abs(names["simulation"].coordinates[0] - 0.1) < 1e-3
     assert len(names["contacts"]) > 1000 and isinstance(names["contacts"], tesdf.Contacts)

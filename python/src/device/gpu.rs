@@ -85,7 +85,7 @@ impl Described {
 }
 
 /// The devices of this machine, the best first: a list of Device, whose number or a part of whose
-/// name is an argument device.
+/// name is an argument device. Empty where the package was built without the GPU.
 #[pyfunction]
 pub fn devices(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyAny>>> {
     let found = py.detach(|| -> Result<Vec<DeviceInfo>, Error> {

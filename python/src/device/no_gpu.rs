@@ -22,10 +22,10 @@ pub fn open(py: Python<'_>, name: Option<&str>) -> PyResult<Device> {
 }
 
 /// The devices of this machine, the best first: a list of Device, whose number or a part of whose
-/// name is an argument device.
+/// name is an argument device. Empty where the package was built without the GPU.
 #[pyfunction]
-pub fn devices(py: Python<'_>) -> PyResult<Vec<Py<PyAny>>> {
-    Err(Error::BuiltWithoutGpu(String::new()).raise(py))
+pub fn devices() -> Vec<Py<PyAny>> {
+    Vec::new()
 }
 
 impl Device {

@@ -8,10 +8,10 @@ HOW = 'built without the GPU; build it in the repository with `pip install ./pyt
 
 
 def test_a_device_is_an_error_that_says_how_to_build(asset, points):
+    assert tesdf.devices() == []
     ball = tesdf.Sphere(1)
     scene = {"time_step": 1e-3, "duration": 1e-3, "bodies": [{"name": "ball", "shape": {"sphere": {"radius": 1}}, "mass": 1}]}
     for call in (
-        tesdf.devices,
         lambda: tesdf.DeviceArray(np.zeros(3)),
         lambda: tesdf.collide(ball, ball, device="gpu"),
         lambda: asset.query(points, device="cuda:0"),

@@ -50,18 +50,24 @@ impl AssetCache {
         &self.folder
     }
 
-    /// The mesh files, or bodies of several parts, that were encoded so far because they were not
+    /// The mesh files, or names of meshes in memory, that were encoded so far because they were not
     /// in it.
     pub fn encoded(&self) -> Vec<PathBuf> {
         self.encoded.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The asset of a mesh file: that of the cache, or what `encode` makes, which is kept. A cache
-    /// that cannot be read or written costs the time of encoding, and nothing else.
+    /// The hash of a mesh in memory, in hexadecimal digits.
+    pub fn blake3_of(mesh: &TriangleMesh) -> String {
+        hashed("", mesh)
+    }
+
+    /// The asset of a mesh file: that of the cache, or what `encode` makes, which is kept: an asset
+    /// of this file under the rule and the repair, with the preset "fast". A cache that cannot be read
+    /// or written costs the time of encoding, and nothing else.
     ///
     /// # Errors
     /// Those of `encode`.
-    pub(super) fn get<E>(
+    pub fn get<E>(
         &self,
         file: &Path,
         inside: Inside,
@@ -71,8 +77,11 @@ impl AssetCache {
         self.keep(file, || read(file).ok().map(|mesh| key(file, &mesh, inside, repair)), encode)
     }
 
-    /// As [`get`](Self::get), for a mesh that is made of several, of the body `name`.
-    pub(super) fn of_mesh<E>(
+    /// As [`get`](Self::get), for a mesh in memory; [`encoded`](Self::encoded) tells its `name`.
+    ///
+    /// # Errors
+    /// Those of `encode`.
+    pub fn of_mesh<E>(
         &self,
         name: &str,
         mesh: &TriangleMesh,
