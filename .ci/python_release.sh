@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Tests the Python package with what takes long to install or to start: MJWarp, Newton, Ray, Chromium,
-# rerun, USD, and Vulkan's software driver; and the wheel without the GPU. Newton needs an older MuJoCo,
-# so it has an environment of its own. `.ci/python.sh` has the tests of the package.
+# Tests the Python package with what takes long to install or to start: MJWarp, Newton, PyTorch, Ray,
+# Chromium, rerun, USD, and Vulkan's software driver; and the wheel without the GPU. Newton needs an
+# older MuJoCo, so it has an environment of its own. `.ci/python.sh` has the tests of the package.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
@@ -35,11 +35,12 @@ in_newton() {
             in_environment newton -m pytest $tests/test_newton_device.py
 }
 in_release() {
-    step "MJWarp, Ray, Chromium, rerun, USD" in_environment release -m pytest $tests --ignore $tests/test_newton.py \
+    step "MJWarp, PyTorch, Ray, Chromium, rerun, USD" in_environment release -m pytest $tests --ignore $tests/test_newton.py \
         --ignore $tests/test_newton_device.py --ignore $tests/test_no_device.py --ignore $tests/test_mujoco_warp_device.py &&
-        # With MJWarp, rerun and USD, whose types `.ci/python.sh` does not see.
+        # With MJWarp, PyTorch, rerun and USD, whose types `.ci/python.sh` does not see.
         step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt &&
         step "MJWarp example" in_environment release $tests/unoptimised_kernels.py examples/python/mujoco_warp_nuts_on_bolts.py &&
+        step "PyTorch example" in_environment release examples/python/peg_finds_hole.py &&
         step "Ray example" in_environment release examples/python/ray_encode.py &&
         step "Ray example" in_environment release examples/python/ray_worlds.py &&
         # CUDA's replacement is for these tests only: Warp would take it, too.
