@@ -28,6 +28,7 @@
     tesdf.time_of_impact(asset, asset, pose_b=pose, velocity_b=velocity)
 
     scene.clearances(pairs).distance                    # of many pairs [P, 2]; times_of_impact
+    manager = tesdf.CollisionManager()                  # named bodies, with the methods of trimesh's
     kept = tesdf.InstancePairs()                        # kept.detect(scene): less work where most bodies rest
     tracker = tesdf.PatchTracker()                      # tracker.update(scene, contacts): regions with lasting ids
 
@@ -93,6 +94,7 @@ from .errors import (
     SceneError,
     SimulationError,
 )
+from .managers import CollisionManager, ContactData, DistanceData
 from .playback import LiveView, export
 from .queries import closest_point, contains, signed_distance
 from .reports import (
@@ -124,6 +126,8 @@ __all__ = [
     "ClosestPoints",
     "CoarseContacts",
     "CollideError",
+    "CollisionManager",
+    "ContactData",
     "ContactForces",
     "ContactPatches",
     "Contacts",
@@ -135,6 +139,7 @@ __all__ = [
     "DeviceArray",
     "DeviceContacts",
     "DeviceError",
+    "DistanceData",
     "EncodeError",
     "HiddenOverlaps",
     "Impact",

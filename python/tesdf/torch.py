@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from . import _derivatives, _native
 from .contacts import Clearances, Contacts
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ContactDistances", "clearance", "collide", "signed_distance", "signed_distance_and_gradient", "time_of_impact"]
 
-Tensor = torch.Tensor
+
 
 
 @torch.compiler.disable
