@@ -1,9 +1,10 @@
-"""Runs the code of both READMEs."""
+"""Runs the code of both READMEs, and compares the docstrings of the stubs."""
 
 from pathlib import Path
 
 import pytest
 import tesdf
+from stub_docstrings import STUBS, with_docstrings
 from test_simulation import SCENE
 
 PYTHON = Path(__file__).resolve().parents[1]
@@ -40,3 +41,9 @@ def test_the_code_of_the_project_runs(run):
     names = run(PYTHON.parent / "README.md", 2)
     assert len(names["contacts"]) > 100 and Path("part.tesdf").exists()
     assert (names["answers"].signed_distance == names["part"].signed_distance(names["points"])).all()
+
+
+def test_the_stubs_have_the_docstrings_of_the_module():
+    text = STUBS.read_text()
+    assert with_docstrings(text) == text, "run python python/tests/stub_docstrings.py"
+    assert text.count('"""') > 200
