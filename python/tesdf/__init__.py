@@ -27,6 +27,7 @@
     tesdf.collide(asset, tesdf.Sphere(1.0), pose_b=pose)             # contacts of two bodies
     tesdf.time_of_impact(asset, asset, pose_b=pose, velocity_b=velocity)
 
+    import tesdf.torch                                  # distances and clearances with derivatives
     scene.clearances(pairs).distance                    # of many pairs [P, 2]; times_of_impact
     manager = tesdf.CollisionManager()                  # named bodies, with the methods of trimesh's
     kept = tesdf.InstancePairs()                        # kept.detect(scene): less work where most bodies rest
