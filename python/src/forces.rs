@@ -23,5 +23,6 @@ pub fn of_joints<'py>(py: Python<'py>, forces: &[JointForce]) -> PyResult<Bound<
         .add_rows("forces", forces.iter().map(|joint| joint.force.to_array()))?
         .add_rows("torques", forces.iter().map(|joint| joint.torque.to_array()))?
         .add("motors", forces.iter().map(|joint| joint.motor))?
+        .add("couplings", forces.iter().map(|joint| joint.coupling))?
         .build("JointForces")
 }

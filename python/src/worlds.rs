@@ -495,13 +495,14 @@ impl Worlds {
                 to.extend(joint_forces_of(world).iter().flat_map(|joint| of(joint).to_array()));
             })
         };
-        let motors = self.numbers(py, &[joints], |world, to| {
-            to.extend(joint_forces_of(world).iter().map(|joint| joint.motor));
-        })?;
+        let along = |of: fn(&JointForce) -> f64| {
+            self.numbers(py, &[joints], move |world, to| to.extend(joint_forces_of(world).iter().map(of)))
+        };
         Columns::new(py)
             .with("forces", vectors(|joint| joint.force)?)?
             .with("torques", vectors(|joint| joint.torque)?)?
-            .with("motors", motors)?
+            .with("motors", along(|joint| joint.motor)?)?
+            .with("couplings", along(|joint| joint.coupling)?)?
             .build("JointForces")
     }
 

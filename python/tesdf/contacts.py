@@ -395,14 +395,16 @@ class ContactForces(_Table):
 @dataclass(frozen=True, eq=False, repr=False)
 class JointForces(_Table):
     """What each of J joints did to its child in a step, as the mean over the step. To its parent, it
-    did the opposite."""
+    did the opposite. Forces and torques are with those of motors and couplings."""
 
     forces: _Float
-    """[J, 3] N, with that of the motor of a slider"""
+    """[J, 3] N"""
     torques: _Float
-    """[J, 3] about the joint's anchor, N m, with that of the motor of a hinge"""
+    """[J, 3] about the joint's anchor, N m"""
     motors: _Float
     """[J] torque of the motor of a hinge, N m, or force of that of a slider, N"""
+    couplings: _Float
+    """[J] likewise of the couplings with other joints"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -24,17 +24,19 @@ impl ContactForce {
     }
 }
 
-/// What a joint does to its child: its mean over a step. To its parent, it does the opposite.
+/// What a joint does to its child: its mean over a step. To its parent, it does the opposite. Force
+/// and torque are with those of its motor and its couplings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointForce {
-    /// The force on the child in the world, N, with that of the motor of a slider.
+    /// The force on the child in the world, N.
     pub force: DVec3,
-    /// The torque on the child about the origin of the joint's frame on it, in the world, N m, with
-    /// that of the motor of a hinge.
+    /// The torque on the child about the origin of the joint's frame on it, in the world, N m.
     pub torque: DVec3,
     /// What the motor does: torque about the axis of a hinge, N m, or force along that of a slider,
     /// N.
     pub motor: f64,
+    /// Likewise what couplings with other joints do.
+    pub coupling: f64,
 }
 
 /// The forces of a step.
@@ -64,6 +66,7 @@ impl Forces {
             sum.force += share * joint.force;
             sum.torque += share * joint.torque;
             sum.motor += share * joint.motor;
+            sum.coupling += share * joint.coupling;
         }
     }
 

@@ -12,7 +12,7 @@
 //! - [`System`]: the bodies, their states and gravity.
 //! - [`Dynamics`]: the trait of every physics engine, which advances a system by a time step.
 //!   [`newton`] is the built-in engine.
-//! - [`Joint`], [`Motor`]: what connects bodies besides contacts.
+//! - [`Joint`], [`Motor`], [`Coupling`]: what connects bodies besides contacts.
 //! - [`script`]: keyframes of kinematic bodies, motors and wrenches.
 //! - [`scene_file`]: scenes as TOML files.
 //! - [`robot`]: robot descriptions in URDF and MJCF.
@@ -25,6 +25,7 @@
 //! processor, the same input gives the same bits on any number of threads.
 #![warn(missing_docs)]
 
+mod coupling;
 pub mod criterion;
 mod dynamics;
 mod error;
@@ -42,6 +43,7 @@ mod totals;
 mod warning;
 mod worlds;
 
+pub use coupling::Coupling;
 pub use dynamics::{Dynamics, Residual, StepReport};
 pub use error::DynamicsError;
 pub use forces::{ContactForce, Forces, JointForce};

@@ -22,7 +22,7 @@
 //! | `forces.ids` | `u32 [F, 2]` | bodies: the force acts on the first, its opposite on the second |
 //! | `forces.points` | `f64 [F, 3]` | where it acts, m, world frame |
 //! | `forces.contacts` | `f32 [F, 6]` | along the normal, and friction, N, world frame |
-//! | `forces.joints` | `f32 [Q · J, 7]` | on the child: force, N; torque, N m; what the motor does |
+//! | `forces.joints` | `f32 [Q · J, 8]` | on the child: force, N; torque, N m; what motor and couplings do |
 //!
 //! S is the number of steps, B of bodies, J of joints, R of steps with recorded contacts, C of
 //! contacts, H of hidden overlaps, Q of steps with recorded forces, and F of contacts that push.
@@ -71,7 +71,7 @@ pub use journal::{InterruptedRun, RunJournal};
 pub use origin::RunOrigin;
 
 /// The version of complete runs and journals that this build writes and reads.
-pub const RUN_VERSION: u32 = 4;
+pub const RUN_VERSION: u32 = 5;
 const KEY: &str = "tesdf_run";
 
 /// States of all bodies over time, and the contacts and forces of some steps.
@@ -371,7 +371,7 @@ impl RunRecord {
             tensors.push(tensor("forces.ids", Dtype::U32, vec![ids.len(), 2], ids.as_flattened())?);
             tensors.push(tensor("forces.points", Dtype::F64, vec![ids.len(), 3], points.as_flattened())?);
             tensors.push(tensor("forces.contacts", Dtype::F32, vec![ids.len(), 6], contacts.as_flattened())?);
-            tensors.push(tensor("forces.joints", Dtype::F32, vec![joints.len(), 7], joints.as_flattened())?);
+            tensors.push(tensor("forces.joints", Dtype::F32, vec![joints.len(), 8], joints.as_flattened())?);
         }
         Ok(serialize(tensors, Some(metadata))?)
     }
@@ -425,7 +425,7 @@ impl RunRecord {
                 ids: values(&file, "forces.ids", Dtype::U32, &[2])?,
                 points: values(&file, "forces.points", Dtype::F64, &[3])?,
                 contacts: values(&file, "forces.contacts", Dtype::F32, &[6])?,
-                joints: values(&file, "forces.joints", Dtype::F32, &[7])?,
+                joints: values(&file, "forces.joints", Dtype::F32, &[8])?,
             },
             Err(_) => ForceRows::default(),
         };

@@ -214,7 +214,7 @@ impl Script {
                 }
             }
             (None, Some(name)) => {
-                let joint = joint(system, name)?;
+                let joint = joint_named(system, name)?;
                 self.targets(joint, &system.joints()[joint])?
             }
             _ => return Err("expected either body or joint".into()),
@@ -319,7 +319,8 @@ fn body(system: &System, name: &str) -> Result<usize, String> {
     found.ok_or_else(|| format!("there is no body {name}; give the name of one of the scene's bodies"))
 }
 
-fn joint(system: &System, name: &str) -> Result<usize, String> {
+/// The number of the joint of this name.
+pub(crate) fn joint_named(system: &System, name: &str) -> Result<usize, String> {
     let found = system.joints().iter().position(|joint| joint.name == name);
     found.ok_or_else(|| format!("there is no joint {name}; give the name of one of the scene's joints"))
 }

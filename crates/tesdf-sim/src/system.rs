@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 use tesdf::collide::{CollideError, Instance, InstanceId, Pose, Scene, Shape, ShapeId, Velocity};
 
+use crate::coupling::{Coupling, Couplings};
 use crate::joint::wrapped;
 use crate::{DynamicsError, Joint, JointKind, MassProperties, Motor};
 
@@ -90,6 +91,7 @@ pub struct System {
     states: Vec<State>,
     wrenches: Vec<Wrench>,
     joints: Vec<Joint>,
+    couplings: Couplings,
     /// The coordinate of each joint, with its whole turns.
     coordinates: Vec<f64>,
     /// Coefficients of friction of pairs of bodies, the lower number first.
@@ -186,9 +188,34 @@ impl System {
         &self.joints
     }
 
+    /// Adds a coupling of two joints. An engine refuses a system in which couplings do not hold at
+    /// the start.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoJoint`], or [`DynamicsError::Joint`] when a joint is neither a hinge nor
+    /// a slider, a number is out of range, or a joint would follow two others or itself.
+    pub fn add_coupling(&mut self, coupling: Coupling) -> Result<(), DynamicsError> {
+        self.couplings.add(coupling, &self.joints)?;
+        self.couplings.count_turns(&self.joints, &mut self.coordinates);
+        Ok(())
+    }
+
+    /// Checks whether all couplings hold.
+    ///
+    /// # Errors
+    /// [`DynamicsError::Joint`] with a joint that is not where its coupling asks it to be.
+    pub(crate) fn check_couplings(&self) -> Result<(), DynamicsError> {
+        self.couplings.check(&self.joints, &self.coordinates)
+    }
+
+    /// The couplings of joints.
+    pub fn couplings(&self) -> &[Coupling] {
+        self.couplings.all()
+    }
+
     /// The [coordinate](Joint::coordinate) of each joint now, where the angle of a hinge goes on past
     /// ±π: it counts the turns that steps have made since the joint was added. A state that is set
-    /// from outside counts as the shortest turn.
+    /// from outside counts as the shortest turn, or as that which a coupling asks for.
     pub fn coordinates(&self) -> &[f64] {
         &self.coordinates
     }
@@ -247,6 +274,7 @@ impl System {
         self.states = states;
         let coordinates = self.joints.iter().zip(turned).map(|(joint, near)| self.coordinate(joint, near));
         self.coordinates = coordinates.collect();
+        self.couplings.count_turns(&self.joints, &mut self.coordinates);
         Ok(())
     }
 
@@ -454,6 +482,7 @@ impl System {
                 self.coordinates[k] = self.coordinate(joint, self.coordinates[k]);
             }
         }
+        self.couplings.count_turns(&self.joints, &mut self.coordinates);
         Ok(())
     }
 
@@ -472,8 +501,8 @@ impl System {
     /// changes.
     ///
     /// # Errors
-    /// As [`set_states`](Self::set_states), and [`DynamicsError::Collide`] when a rotation is not
-    /// of unit length.
+    /// As [`set_states`](Self::set_states), [`DynamicsError::Collide`] when a rotation is not
+    /// of unit length, and [`DynamicsError::Joint`] when a coupling does not hold.
     pub fn reset(&mut self, mut states: Vec<State>) -> Result<(), DynamicsError> {
         for (body, state) in states.iter_mut().enumerate().take(self.bodies.len()) {
             self.check(body, state)?;
@@ -481,8 +510,13 @@ impl System {
                 state.pose = Pose::new(state.pose.translation, state.pose.rotation)?;
             }
         }
+        let before = (self.states.clone(), self.coordinates.clone());
         // Of the turns of hinges, none counts.
         self.replace_states(states, vec![0.0; self.joints.len()])?;
+        if let Err(e) = self.check_couplings() {
+            (self.states, self.coordinates) = before;
+            return Err(e);
+        }
         self.wrenches.fill(Wrench::default());
         Ok(())
     }

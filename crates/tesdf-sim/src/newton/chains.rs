@@ -6,15 +6,15 @@
 //! becomes energy in the next step: twenty links with an end of twenty times their mass, that swung
 //! from the horizontal, flew apart with one round, and stay within 0.2 µm with these.
 use nalgebra::Vector6;
-use tesdf::collide::Pose;
 
 use super::Newton;
+use super::couplings::coupling_errors;
 use super::geometric::{ARM_TURN, Loads, Motion, Start};
 use super::joints::predict;
 use super::rows::{Gap, Row, RowForce};
 use super::solve::from_last;
 use super::step::Step;
-use crate::{Joint, Mass, State, System};
+use crate::{Coupling, Joint, JointKind, Mass, State, System};
 
 /// Maximum number of rounds for the joints alone. An error falls by three to ten in a round. A
 /// chain with an end of 20,000 times the mass of a link needs six; with four it flew apart.
@@ -23,6 +23,11 @@ const ROUNDS: u32 = 8;
 /// Joints hold when they are apart by less than this part of the child's diagonal, and this angle,
 /// rad.
 const HOLDS: f64 = 2e-6;
+
+/// Couplings hold when they are off by less than this, rad or m, ...
+const COUPLED: f64 = 1e-10;
+/// ... or this part of a coordinate of many turns.
+const ROUNDING: f64 = 1e-14;
 
 /// A step has at most as many parts because of its joints.
 const PARTS: f64 = 64.0;
@@ -69,10 +74,9 @@ impl Newton {
         let mut loads = None;
         for _ in 0..ROUNDS {
             let states = self.moved(step, &iterate.velocities);
-            if self.joint_error(&states) < HOLDS {
+            if self.joint_error(&states, step.h) < HOLDS && self.are_coupled(&states, step.h) {
                 break;
             }
-            let poses: Vec<Pose> = states.iter().map(|state| state.pose).collect();
             step.turn(&mut iterate.plain, &iterate.velocities);
             // Forces that close a gap are no loads: with a stiffness that follows them in each
             // round, the rounds converge more slowly.
@@ -80,7 +84,7 @@ impl Newton {
             let loads = loads.get_or_insert_with(|| Loads::new(step.free.len(), rows, forces, of_joints));
             iterate.stiffened = iterate.plain.stiffened(loads, found_at, start);
             let rows = &mut iterate.rows[of_joints..];
-            predict(rows, &self.gaps(step).bodies(), &poses, &iterate.velocities, step.h);
+            predict(rows, &self.gaps(step).bodies(), &states, &iterate.velocities, step.h);
             let (rows, velocities) = (&iterate.rows, &iterate.velocities);
             let solved = self.solve(
                 step,
@@ -96,8 +100,8 @@ impl Newton {
     /// Whether joints that a shorter part may hold do not hold in a part of `time` seconds of the step
     /// `whole`, which leads to `states`, or arms turn too far in it.
     pub(super) fn is_loose(&self, states: &[State], time: f64, whole: f64) -> bool {
-        let allowed = HOLDS.max(WORSE * self.joint_error(self.system.states()));
-        let far = self.joint_error(states) > allowed || time * self.arm_rate(states) > 2.0 * ARM_TURN;
+        let allowed = HOLDS.max(WORSE * self.joint_error(self.system.states(), 0.0));
+        let far = self.joint_error(states, time) > allowed || time * self.arm_rate(states) > 2.0 * ARM_TURN;
         far && time > 1.5 * whole / PARTS
     }
 
@@ -108,14 +112,30 @@ impl Newton {
         (left / parts).max(whole / PARTS).min(left)
     }
 
-    /// The greatest error of a joint: its distance as part of the child's diagonal, or its angle,
-    /// rad.
-    fn joint_error(&self, states: &[State]) -> f64 {
+    /// The greatest error of a joint or a coupling: its distance as part of the child's diagonal, or
+    /// its angle, rad. The states are those after a motion of `time` seconds at their velocities.
+    fn joint_error(&self, states: &[State], time: f64) -> f64 {
         let of_joint = |joint: &Joint| {
             let (distance, angle) = joint.error(System::poses_of(joint, states));
             angle.max(distance / self.sizes[joint.child])
         };
-        self.system.joints().iter().map(of_joint).fold(0.0, f64::max)
+        let of_coupling = |(coupling, error): (&Coupling, f64)| {
+            let Joint { kind, child, .. } = &self.system.joints()[coupling.joint];
+            let size = if *kind == JointKind::Slider { self.sizes[*child] } else { 1.0 };
+            error.abs() / size
+        };
+        let errors = coupling_errors(&self.system, states, time);
+        let of_couplings = self.system.couplings().iter().zip(errors).map(of_coupling);
+        self.system.joints().iter().map(of_joint).chain(of_couplings).fold(0.0, f64::max)
+    }
+
+    /// Whether all couplings hold at such states.
+    fn are_coupled(&self, states: &[State], time: f64) -> bool {
+        let couplings = self.system.couplings().iter().zip(coupling_errors(&self.system, states, time));
+        couplings.into_iter().all(|(coupling, error)| {
+            let target = coupling.target(self.system.coordinates());
+            error.abs() < COUPLED.max(ROUNDING * target.abs())
+        })
     }
 
     /// The greatest rate at which the arm of a joint turns, rad/s.

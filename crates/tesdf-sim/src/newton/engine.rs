@@ -72,7 +72,8 @@ impl Newton {
     /// clearance tunnelled.
     ///
     /// # Errors
-    /// An option of `options` or `collide` is out of range.
+    /// An option of `options` or `collide` is out of range, or a coupling does not hold at the
+    /// start.
     pub fn new(
         system: System,
         detector: impl Detect + 'static,
@@ -81,6 +82,7 @@ impl Newton {
     ) -> Result<Self, DynamicsError> {
         options.validate()?;
         collide.validate()?;
+        system.check_couplings()?;
         let diagonals = system.bodies().iter().map(|body| system.diagonal(body));
         let sizes = diagonals.collect::<Result<_, CollideError>>()?;
         let reach = greatest_reach(&system)?;

@@ -170,6 +170,7 @@ mod tests {
         Row {
             id: RowId::Joint(0),
             sides: [side, None],
+            coupled: Vec::new(),
             point: DVec3::ZERO,
             arms: [arm, DVec3::ZERO],
             gap: 0.0,

@@ -14,15 +14,16 @@ pub struct Island {
 pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
     let mut parent: Vec<usize> = (0..bodies).collect();
     for row in rows {
-        if let [Some((a, _)), Some((b, _))] = row.sides {
-            join(&mut parent, a, b);
+        let mut bodies = row.bodies();
+        if let Some(&(a, _)) = bodies.next() {
+            bodies.for_each(|&(b, _)| join(&mut parent, a, b));
         }
     }
     let mut of_root: Vec<Option<usize>> = vec![None; bodies];
     let mut islands: Vec<Island> = Vec::new();
     let mut touched = vec![false; bodies];
     for row in rows {
-        row.sides.iter().flatten().for_each(|&(body, _)| touched[body] = true);
+        row.bodies().for_each(|&(body, _)| touched[body] = true);
     }
     for body in (0..bodies).filter(|&body| touched[body]) {
         let root = root(&mut parent, body);
@@ -33,7 +34,7 @@ pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
         islands[island].bodies.push(body);
     }
     for (k, row) in rows.iter().enumerate() {
-        if let Some(&(body, _)) = row.sides.iter().flatten().next()
+        if let Some(&(body, _)) = row.bodies().next()
             && let Some(island) = of_root[root(&mut parent, body)]
         {
             islands[island].rows.push(k);
@@ -82,6 +83,7 @@ mod tests {
             id: RowId::Joint(0),
             arms: [DVec3::ZERO; 2],
             sides: [side(a), side(b)],
+            coupled: Vec::new(),
             point: DVec3::ZERO,
             gap: 0.0,
             relaxed_gap: 0.0,

@@ -1,4 +1,4 @@
-//! Converts joints to rows of the convex problem.
+//! Converts joints and their couplings to rows of the convex problem.
 //!
 //! The rows keep the directions that they have at the beginning of the step, also when the bodies
 //! were predicted; only the gaps follow, as in SHAKE (Ryckaert, Ciccotti and Berendsen 1977). With
@@ -7,10 +7,11 @@ use glam::DVec3;
 use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
+use super::couplings::{coupling_errors, coupling_rows, predict_couplings};
 use super::integrate::pack;
 use super::rows::{Bodies, PUSHES, Resistance, Row, RowId, Stiffness};
 use crate::joint::{JointResistance, axes, nearest_turn, rotation_between, swing, wrapped};
-use crate::{Drive, Joint, JointKind, Mass, System};
+use crate::{Drive, Joint, JointKind, Mass, State, System};
 
 /// A direction in which a joint measures an error: of the translation at a point, or of the
 /// rotation.
@@ -44,23 +45,30 @@ enum Error {
     Rate(f64),
 }
 
-/// The rows of all joints at the poses of the beginning of the step.
+/// The rows of all joints, then those of all couplings, at the poses of the beginning of the step.
 pub fn joint_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
-    rows(bodies, h, |measure| measure)
+    rows(bodies, h, |measure| measure, coupling_rows(bodies, h))
 }
 
 /// The same for an impact, which takes no time: what must hold, whatever it takes, stops to move,
 /// and all else, such as limits, springs and motors of limited force, does nothing.
 pub fn impact_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
-    rows(bodies, h, |measure| match measure {
+    let change = |measure| match measure {
         Measure { error: Error::Position(_), bounds: FREE, .. } => {
             Measure { error: Error::Position(0.0), ..measure }
         }
         _ => Measure { bounds: [0.0; 2], ..measure },
-    })
+    };
+    let mut couplings = coupling_rows(bodies, h);
+    let holding = coupling_errors(bodies.system, bodies.system.states(), 0.0);
+    for (row, error) in couplings.iter_mut().zip(holding) {
+        row.gap -= error;
+        row.relaxed_gap = row.gap;
+    }
+    rows(bodies, h, change, couplings)
 }
 
-fn rows(bodies: &Bodies<'_>, h: f64, change: impl Fn(Measure) -> Measure) -> Vec<Row> {
+fn rows(bodies: &Bodies<'_>, h: f64, change: impl Fn(Measure) -> Measure, couplings: Vec<Row>) -> Vec<Row> {
     let of_joint = |(joint, &near): (&Joint, &f64)| {
         let states = bodies.system.states();
         let poses = System::poses_of(joint, states);
@@ -72,24 +80,25 @@ fn rows(bodies: &Bodies<'_>, h: f64, change: impl Fn(Measure) -> Measure) -> Vec
             .collect::<Vec<_>>()
     };
     let rows = bodies.system.joints().iter().zip(bodies.system.coordinates()).flat_map(of_joint);
-    rows.enumerate().map(|(k, row)| Row { id: RowId::Joint(k), ..row }).collect()
+    rows.chain(couplings).enumerate().map(|(k, row)| Row { id: RowId::Joint(k), ..row }).collect()
 }
 
-/// Sets the gaps of `rows`, which are those of all joints, to the errors at the poses that
-/// `velocities` predict.
-pub fn predict(rows: &mut [Row], bodies: &Bodies<'_>, poses: &[Pose], velocities: &[Vector6<f64>], h: f64) {
+/// Sets the gaps of `rows`, which are those of all joints and couplings, to the errors at the
+/// `states` that `velocities` lead to.
+pub fn predict(rows: &mut [Row], bodies: &Bodies<'_>, states: &[State], velocities: &[Vector6<f64>], h: f64) {
     let of_joint = |(joint, &near): (&Joint, &f64)| {
-        let parent = joint.parent.map_or(Pose::IDENTITY, |parent| poses[parent]);
         // The rate matters for no position.
-        measures(joint, [parent, poses[joint.child]], near, 0.0, h)
+        measures(joint, System::poses_of(joint, states), near, 0.0, h)
     };
-    let joints = bodies.system.joints().iter().zip(bodies.system.coordinates());
-    for (row, measure) in rows.iter_mut().zip(joints.flat_map(of_joint)) {
+    let (joints, couplings) = rows.split_at_mut(rows.len() - bodies.system.couplings().len());
+    let measures = bodies.system.joints().iter().zip(bodies.system.coordinates()).flat_map(of_joint);
+    for (row, measure) in joints.iter_mut().zip(measures) {
         if let Error::Position(error) = measure.error {
             row.gap = error - h * row.rate(velocities);
             row.relaxed_gap = row.gap;
         }
     }
+    predict_couplings(couplings, bodies, states, velocities, h);
 }
 
 /// The number of rows of a joint; that of its motor is the last one.
@@ -222,6 +231,7 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
     Row {
         id: RowId::Joint(0),
         sides,
+        coupled: Vec::new(),
         point,
         arms,
         gap,

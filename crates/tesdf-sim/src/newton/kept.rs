@@ -82,7 +82,7 @@ impl Kept {
                 rows: 0,
             };
             self.bodies.extend(step.free.iter().enumerate().map(of_body));
-            for (k, _) in self.rows.iter().flat_map(|row| row.sides.iter().flatten()) {
+            for (k, _) in self.rows.iter().flat_map(Row::bodies) {
                 self.bodies[*k].rows += 1;
             }
         }
@@ -147,7 +147,7 @@ impl Known<'_> {
         let forces = island.rows.iter().map(of_row).collect::<Option<_>>()?;
         // No row has gone, either.
         let rows_of_bodies: usize = island.bodies.iter().map(|&k| bodies[k].rows).sum();
-        let sides = island.rows.iter().flat_map(|&k| rows[k].sides.iter().flatten());
+        let sides = island.rows.iter().flat_map(|&k| rows[k].bodies());
         (sides.count() == rows_of_bodies).then_some((velocities, forces))
     }
 }

@@ -2,13 +2,14 @@
 //! bundles of four that share their bodies.
 //!
 //! All rows of a pair of bodies act on the motion of one body relative to the other, so they are
-//! summed up for it, and the sum is passed on to the two bodies.
+//! summed up for it, and the sum is passed on to the two bodies. A coupling acts on its rate.
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::DVec3;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
+use super::group::{Coupled, Group};
 use super::lanes::{Lanes, WIDTH};
 use super::pattern::Pattern;
 use super::relative::Relative;
@@ -48,11 +49,13 @@ pub struct Inverse {
 }
 
 /// A row of an island.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Placed<'a> {
     pub row: &'a Row,
-    /// The index of the body of each side in the island.
+    /// The index of the body of each side in the island, ...
     pub bodies: [Option<usize>; 2],
+    /// ... and of those of a coupling.
+    pub coupled: Vec<usize>,
     /// The gap at the end of the step when the velocities are zero, m or rad.
     pub gap: f64,
     pub resistance: Resistance,
@@ -103,10 +106,11 @@ pub struct Forces {
 /// The derivatives of rows by the velocities of the two bodies of a group.
 type Sides = [[Lanes; 6]; 2];
 
-/// The bodies of a group.
-struct Pair<'a> {
-    /// That whose velocity counts, and the other one.
-    inverse: [Option<&'a Inverse>; 2],
+/// The inverse masses of a group.
+struct Masses {
+    /// Of the body whose velocity counts, and of the other one. A coupling has the inverse mass of its
+    /// rate as the first one.
+    inverse: [Option<Inverse>; 2],
     time_step: f64,
 }
 
@@ -133,7 +137,7 @@ pub struct Batch {
 /// Rows in bundles.
 #[derive(Clone, Debug, Default)]
 pub struct Lines {
-    pub groups: Vec<Relative>,
+    pub groups: Vec<Group>,
     pub batches: Vec<Batch>,
     pub bundles: Vec<Bundle>,
     /// The groups of each pair of bodies; of a single body, with itself.
@@ -168,11 +172,26 @@ impl Inverse {
     }
 }
 
-impl Pair<'_> {
+impl Masses {
+    fn of(group: &Group, bodies: &Bodies) -> Self {
+        let inverse = match group {
+            Group::Relative(Relative { body, other, .. }) => {
+                let inverse = [Some(*body), other.map(|other| other.body)];
+                inverse.map(|body| body.map(|body| bodies.inverse[body]))
+            }
+            Group::Coupled(Coupled { bodies: coupled, .. }) => {
+                let weight = |(body, j): &(usize, Vector6<f64>)| j.dot(&bodies.inverse[*body].times(j));
+                let mass = coupled.iter().map(weight).sum();
+                [Some(Inverse { mass, inertia: Matrix3::zeros() }), None]
+            }
+        };
+        Self { inverse, time_step: bodies.time_step }
+    }
+
     /// `w`
     #[inline]
     fn weight(&self, sides: &Sides) -> Lanes {
-        let of_side = |(inverse, j): (&Option<&Inverse>, _)| inverse.map(|inverse| inverse.weight(j));
+        let of_side = |(inverse, j): (&Option<Inverse>, _)| inverse.as_ref().map(|inverse| inverse.weight(j));
         self.inverse.iter().zip(sides).filter_map(of_side).fold(Lanes::ZERO, |sum, weight| sum + weight)
     }
 
@@ -206,7 +225,14 @@ impl Placed<'_> {
             (Some((_, j)), Some(body)) => dot6(j, &velocity[*body]),
             _ => 0.0,
         };
-        self.gap + time_step * self.row.sides.iter().zip(&self.bodies).map(rate).sum::<f64>()
+        let coupled = self.of_coupling().map(|(body, j)| dot6(j, &velocity[body])).sum::<f64>();
+        let of_sides = self.row.sides.iter().zip(&self.bodies).map(rate).sum::<f64>();
+        self.gap + time_step * (of_sides + coupled)
+    }
+
+    /// The bodies of a coupling and the derivatives by their velocities.
+    pub fn of_coupling(&self) -> impl Iterator<Item = (usize, &Vector6<f64>)> {
+        self.coupled.iter().copied().zip(self.row.coupled.iter().map(|(_, j)| j))
     }
 
     /// The side whose velocity, relative to the other one, counts: that of the smaller body, near
@@ -234,25 +260,30 @@ impl Lines {
         self.bundles.reserve(members.len() / WIDTH + self.groups.len());
         for batch in members.chunk_by(|a, b| (a.group, a.slips) == (b.group, b.slips)) {
             let (first, Member { group, slips, .. }) = (self.bundles.len(), batch[0]);
-            let Relative { body, other, .. } = &self.groups[group];
-            let inverse = [Some(*body), other.map(|other| other.body)];
-            let inverse = inverse.map(|body| body.map(|body| &bodies.inverse[body]));
-            let pair = Pair { inverse, time_step: bodies.time_step };
-            self.bundles.extend(batch.chunks(WIDTH).map(|four| Bundle::new(four, rows, &pair)));
+            let masses = Masses::of(&self.groups[group], bodies);
+            self.bundles.extend(batch.chunks(WIDTH).map(|four| Bundle::new(four, rows, &masses)));
             self.batches.push(Batch { group, slips, bundles: first..self.bundles.len() });
         }
     }
 
     /// The group of a row.
     fn group(&mut self, row: &Placed<'_>, reference: usize, bodies: &Bodies, pattern: &Pattern) -> usize {
+        if !row.coupled.is_empty() {
+            let coupled = row.of_coupling().map(|(body, j)| (body, *j)).collect();
+            self.groups.push(Group::Coupled(Coupled::new(coupled, pattern)));
+            return self.groups.len() - 1;
+        }
         // One of the sides has a body.
         let body = row.bodies[reference].unwrap_or_default();
         let other = row.bodies[1 - reference];
         let offset = other.map_or(DVec3::ZERO, |_| row.row.arms[1 - reference] - row.row.arms[reference]);
-        let is_same = |group: &Relative| {
-            group.body == body
-                && group.other.map(|other| other.body) == other
-                && group.offset.distance(offset) <= SAME_OFFSET * bodies.levers[body]
+        let is_same = |group: &Group| match group {
+            Group::Relative(group) => {
+                group.body == body
+                    && group.other.map(|other| other.body) == other
+                    && group.offset.distance(offset) <= SAME_OFFSET * bodies.levers[body]
+            }
+            Group::Coupled(_) => false,
         };
         // Rows of a pair come together.
         if let Some(last) = self.groups.len().checked_sub(1).filter(|&last| is_same(&self.groups[last])) {
@@ -263,7 +294,7 @@ impl Lines {
             return group;
         }
         of_pair.push(self.groups.len());
-        self.groups.push(Relative::new(body, other, offset, pattern));
+        self.groups.push(Group::Relative(Relative::new(body, other, offset, pattern)));
         self.groups.len() - 1
     }
 
@@ -291,8 +322,8 @@ fn tangents(normal: DVec3) -> [DVec3; 2] {
 }
 
 impl Bundle {
-    /// One to four members of a batch, whose group has the bodies of `pair`.
-    fn new(members: &[Member], rows: &[Placed<'_>], pair: &Pair<'_>) -> Self {
+    /// One to four members of a batch, whose group has these `masses`.
+    fn new(members: &[Member], rows: &[Placed<'_>], masses: &Masses) -> Self {
         let of = |member: &Member| (rows[member.number].row, [member.reference, 1 - member.reference]);
         let mut along = Sides::default();
         for (lane, member) in members.iter().enumerate() {
@@ -302,9 +333,12 @@ impl Bundle {
                     to.iter_mut().zip(&j.data.0[0]).for_each(|(to, j)| to.0[lane] = *j);
                 }
             }
+            if !row.coupled.is_empty() {
+                along[0][0].0[lane] = 1.0;
+            }
         }
         let count = members.len();
-        let scale = pair.scale(pair.weight(&along), count);
+        let scale = masses.scale(masses.weight(&along), count);
         let (mut numbers, mut gap, mut compliance) = ([0; WIDTH], Lanes::ZERO, Lanes::splat(1.0));
         let mut bounds = [f64::NEG_INFINITY, f64::INFINITY].map(Lanes::splat);
         for (lane, member) in members.iter().enumerate() {
@@ -341,16 +375,16 @@ impl Bundle {
                 coefficient.0[lane] = friction.coefficient;
             }
             let along = directions.map(|t| [0, 1].map(|k| signed(&signs[k], &t, &arms[k])));
-            let weight = pair.weight(&along[0]) + pair.weight(&along[1]);
-            let of_slip = pair.scale(weight * 0.5, count);
+            let weight = masses.weight(&along[0]) + masses.weight(&along[1]);
+            let of_slip = masses.scale(weight * 0.5, count);
             Slips {
-                tangents: along.map(|[j, _]| pair.scaled(j, of_slip)),
+                tangents: along.map(|[j, _]| masses.scaled(j, of_slip)),
                 way: ways.map(|way| of_slip * way),
                 coefficient: coefficient * scale / of_slip,
                 scale: of_slip,
             }
         });
-        let normal = pair.scaled(along[0], scale);
+        let normal = masses.scaled(along[0], scale);
         Self { rows: numbers, count, normal, gap, compliance, bounds, scale, slip }
     }
 

@@ -5,6 +5,7 @@
 //! the arithmetic is that of nalgebra's 6 × 6 matrices.
 use nalgebra::{Cholesky, LU, Matrix6, U6, Vector6};
 
+use super::group::{Coupled, Group};
 use super::pattern::{Column, Pattern};
 use super::relative::{Other, Relative};
 
@@ -49,8 +50,29 @@ impl<'a> BlockMatrix<'a> {
         }
     }
 
-    /// Adds a matrix of a relative velocity.
-    pub fn add(&mut self, of: &Relative, matrix: &Matrix6<f64>) {
+    /// Adds a matrix of the velocity of a group.
+    pub fn add(&mut self, of: &Group, matrix: &Matrix6<f64>) {
+        match of {
+            Group::Relative(relative) => self.add_relative(relative, matrix),
+            Group::Coupled(coupled) => self.add_coupled(coupled, matrix[(0, 0)]),
+        }
+    }
+
+    /// Adds `Jᵀ stiffness J` of the rate of a coupling.
+    fn add_coupled(&mut self, Coupled { bodies, pairs }: &Coupled, stiffness: f64) {
+        for (body, j) in bodies {
+            self.diagonal[*body] += (stiffness * j) * j.transpose();
+        }
+        for &([low, high], pair) in pairs {
+            let (low, high) = (bodies[low].1, bodies[high].1);
+            self.upper[pair] += (stiffness * low) * high.transpose();
+            if let Some(lower) = &mut self.lower {
+                lower[pair] += (stiffness * high) * low.transpose();
+            }
+        }
+    }
+
+    fn add_relative(&mut self, of: &Relative, matrix: &Matrix6<f64>) {
         self.diagonal[of.body] += matrix;
         if let Some(Other { body, pair }) = of.other {
             let beside = of.times_transport(matrix);
@@ -224,7 +246,7 @@ mod tests {
             for (body, other) in [(low, Some(high)), (high, Some(low)), (low, None)] {
                 let root = Matrix6::from_fn(|_, _| random.f64() - 0.5);
                 let skew = Matrix6::from_fn(|_, _| random.f64() - 0.5);
-                let of = Relative::new(body, other, offset(random), pattern);
+                let of = Group::Relative(Relative::new(body, other, offset(random), pattern));
                 matrix.add(&of, &(root * root.transpose() + turned * (skew - skew.transpose())));
             }
         }
@@ -268,35 +290,42 @@ mod tests {
     fn an_indefinite_matrix_has_no_factor() {
         let pattern = Pattern::new(2, vec![(0, 1)]);
         let mut matrix = BlockMatrix::symmetric(&pattern, vec![Matrix6::identity(); 2]);
-        matrix.add(&Relative::new(0, Some(1), DVec3::ZERO, &pattern), &-Matrix6::repeat(1.0));
+        let of = Group::Relative(Relative::new(0, Some(1), DVec3::ZERO, &pattern));
+        matrix.add(&of, &-Matrix6::repeat(1.0));
         assert!(matrix.factor().is_none());
         assert!(BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 2]).factor().is_none());
     }
 
-    /// The matrix of a relative velocity is that of its derivatives by the velocities, and what
-    /// acts on it is their transpose. With bodies in either order and alone.
+    /// The matrix of a group is that of its derivatives by the velocities, and what acts on it is
+    /// their transpose. Relative velocities with bodies in either order and alone; couplings of one
+    /// to three bodies.
     #[test]
-    fn relative_velocities_have_their_derivatives() {
-        let pattern = Pattern::new(2, vec![(0, 1)]);
+    fn groups_have_their_derivatives() {
+        let pattern = Pattern::new(3, vec![(0, 1), (0, 2), (1, 2)]);
         let random = &mut fastrand::Rng::with_seed(7);
-        for (body, other) in [(0, Some(1)), (1, Some(0)), (1, None)] {
-            let of = Relative::new(body, other, offset(random), &pattern);
-            let mut derivatives = DMatrix::zeros(6, 12);
-            for k in 0..12 {
-                let mut velocity = [Vector6::zeros(); 2];
+        let relative = [(0, Some(1)), (1, Some(0)), (1, None)]
+            .map(|(body, other)| Group::Relative(Relative::new(body, other, offset(random), &pattern)));
+        let coupled = [vec![0, 1, 2], vec![0, 2], vec![1]].map(|bodies| {
+            let bodies = bodies.into_iter().map(|body| (body, vector(random))).collect();
+            Group::Coupled(Coupled::new(bodies, &pattern))
+        });
+        for of in relative.into_iter().chain(coupled) {
+            let mut derivatives = DMatrix::zeros(6, 18);
+            for k in 0..18 {
+                let mut velocity = [Vector6::zeros(); 3];
                 velocity[k / 6][k % 6] = 1.0;
                 derivatives.column_mut(k).copy_from_slice(&of.of(&velocity));
             }
             let matrix = Matrix6::from_fn(|_, _| random.f64() - 0.5);
-            let mut sum = BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 2]);
+            let mut sum = BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 3]);
             sum.add(&of, &matrix);
             let expected = derivatives.transpose() * matrix * &derivatives;
             assert!((dense(&sum) - &expected).amax() < 1e-14, "{of:?}");
             let momentum = vector(random);
-            let mut to = [Vector6::zeros(); 2];
+            let mut to = [Vector6::zeros(); 3];
             of.act(momentum.into(), &mut to);
             let expected = derivatives.transpose() * momentum;
-            let off = (0..12).map(|k| (to[k / 6][k % 6] - expected[k]).abs()).fold(0.0, f64::max);
+            let off = (0..18).map(|k| (to[k / 6][k % 6] - expected[k]).abs()).fold(0.0, f64::max);
             assert!(off < 1e-15, "{of:?}");
         }
     }

@@ -14,8 +14,8 @@
 //! skin ([`NewtonOptions::skin`]), and normals at edges that are flush are those of the faces
 //! (`normals.rs`).
 //!
-//! *Joints* (`joints.rs`) are rows `eᵢ + h Jᵢ v = 0`, and *motors* rows whose force stays within
-//! their limit.
+//! *Joints* (`joints.rs`) and their couplings (`couplings.rs`) are rows `eᵢ + h Jᵢ v = 0`, and
+//! *motors* rows whose force stays within their limit.
 //!
 //! `v*` is the velocity without contacts, `gᵢ` the gap, `Jᵢ v` its rate and `h` the time step. The
 //! minimiser moves the poses. The velocity that the next step starts from is the result of a second
@@ -33,11 +33,13 @@ use crate::forces::Forces;
 
 mod bounce;
 mod chains;
+mod couplings;
 mod deep;
 mod engine;
 mod far_contacts;
 mod gaps;
 mod geometric;
+mod group;
 mod hold;
 mod impacts;
 mod integrate;

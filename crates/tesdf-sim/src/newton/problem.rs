@@ -70,12 +70,17 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        let mut pairs: Vec<_> = rows.iter().filter_map(pair).collect();
+        let mut pairs: Vec<_> = rows.iter().flat_map(pairs_of).collect();
         pairs.dedup();
         let pattern = Pattern::new(inertia.len(), pairs);
         let lever = |m: &Matrix6<f64>| LEVER * (m.fixed_view::<3, 3>(3, 3).trace() / m[(0, 0)]).sqrt();
         let levers = inertia.iter().map(lever).collect();
         Self { bodies: Bodies { inertia, inverse, target, levers, time_step }, rows, pattern }
+    }
+
+    /// The velocities without rows, but with those whose force is given.
+    pub fn target(&self) -> &[Vector6<f64>] {
+        &self.bodies.target
     }
 
     /// The problem whose contacts are springs.
@@ -154,12 +159,14 @@ fn is_given(placed: &Placed<'_>) -> bool {
     placed.row.bounds[0] == placed.row.bounds[1]
 }
 
-/// The two bodies of a row, the lower one first.
-fn pair(placed: &Placed<'_>) -> Option<(usize, usize)> {
-    match placed.bodies {
+/// The pairs of the bodies of a row, the lower one first.
+fn pairs_of(placed: &Placed<'_>) -> impl Iterator<Item = (usize, usize)> {
+    let of_sides = match placed.bodies {
         [Some(a), Some(b)] => Some((a.min(b), a.max(b))),
         _ => None,
-    }
+    };
+    let coupled = placed.coupled.iter().enumerate();
+    of_sides.into_iter().chain(coupled.flat_map(|(k, &b)| placed.coupled[..k].iter().map(move |&a| (a, b))))
 }
 
 #[cfg(test)]
@@ -197,6 +204,7 @@ mod tests {
             Row {
                 id: RowId::Joint(k),
                 sides: [side(a, arms[0], normal), side(b, arms[1], -normal).filter(|_| !k.is_multiple_of(3))],
+                coupled: Vec::new(),
                 point: DVec3::ZERO,
                 arms,
                 gap,
@@ -218,7 +226,7 @@ mod tests {
         let inertia = free.iter().map(|body| body.inertia).collect();
         let placed = |row: &'a Row| {
             let bodies = row.sides.map(|side| side.map(|(body, _)| body));
-            Placed { row, bodies, gap: row.gap, resistance: row.resistance }
+            Placed { row, bodies, coupled: Vec::new(), gap: row.gap, resistance: row.resistance }
         };
         Problem::new(inertia, target.to_vec(), rows.iter().map(placed).collect(), H)
     }

@@ -4,9 +4,12 @@ use super::integrate::unpack;
 use super::joints::row_count;
 use super::rows::{Row, RowForce, RowId};
 use crate::forces::{ContactForce, Forces, JointForce};
+use crate::joint::axes;
+use crate::{Joint, JointKind, System};
 
 impl Newton {
-    /// What these rows do. The last ones, from `of_joints` on, are those of all joints.
+    /// What these rows do. The last ones, from `of_joints` on, are those of all joints and
+    /// couplings.
     pub(super) fn reactions(&self, rows: &[Row], forces: &[RowForce], of_joints: usize) -> Forces {
         let mut all = Forces::none(self.system.joints().len());
         let (contacts, joints) = rows.split_at(of_joints);
@@ -24,7 +27,23 @@ impl Newton {
                 sum.motor = 0.0;
             }
         }
+        for (coupling, (_, force)) in self.system.couplings().iter().zip(rows) {
+            for (joint, share) in [(coupling.joint, 1.0), (coupling.of, -coupling.ratio)] {
+                self.couple(&self.system.joints()[joint], share * force.along, &mut all.joints[joint]);
+            }
+        }
         all
+    }
+
+    /// Adds what a coupling does along the coordinate of a joint.
+    fn couple(&self, joint: &Joint, along: f64, to: &mut JointForce) {
+        let [parent, _] = joint.frames_in_world(System::poses_of(joint, self.system.states()));
+        let [_, _, axis] = axes(parent);
+        match joint.kind {
+            JointKind::Slider => to.force += along * axis,
+            JointKind::Hinge | JointKind::Weld | JointKind::Ball => to.torque += along * axis,
+        }
+        to.coupling += along;
     }
 
     /// `None` where a body is not of the system.

@@ -66,6 +66,9 @@ pub struct Row {
     /// Up to two free bodies: the index of each in the list of free bodies, and the derivative of
     /// the gap by its velocity.
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
+    /// Of a coupling of joints, which has no sides: its free bodies, in ascending order, and the
+    /// derivatives of the gap by their velocities.
+    pub coupled: Vec<(usize, Vector6<f64>)>,
     /// Where the force acts in the world, with the bodies where the row was found, m.
     pub point: DVec3,
     /// The vectors from the centres of mass of the two sides to the point where the force acts, m.
@@ -144,10 +147,16 @@ impl Row {
         Self { sides: self.sides.map(|side| side.map(push)), arms, friction: None, ..self.clone() }
     }
 
+    /// Its free bodies: the index of each in the list of free bodies, and the derivative of the gap
+    /// by its velocity.
+    pub fn bodies(&self) -> impl Iterator<Item = &(usize, Vector6<f64>)> {
+        self.sides.iter().flatten().chain(&self.coupled)
+    }
+
     /// Rate of change of the gap at `velocity`, m/s or rad/s.
     #[inline]
     pub fn rate(&self, velocity: &[Vector6<f64>]) -> f64 {
-        self.sides.iter().flatten().map(|(free, jacobian)| jacobian.dot(&velocity[*free])).sum()
+        self.bodies().map(|(free, jacobian)| jacobian.dot(&velocity[*free])).sum()
     }
 
     /// Takes the mean of the directions of this row and of `other`, which has the same bodies.
@@ -185,6 +194,7 @@ impl Row {
         Some(Self {
             id: RowId::Contact([contact.instance_a, contact.instance_b], contact.feature.a),
             sides: sides.map(|side| side.map(|(_, side)| side)),
+            coupled: Vec::new(),
             arms: sides.map(|side| side.map_or(DVec3::ZERO, |(arm, _)| arm)),
             point: contact.point_a,
             gap: contact.distance,

@@ -110,10 +110,8 @@ impl Newton {
             parting.extend(parts.map(Row::parting));
         }
         let mut parting = parting.iter();
-        let place = |row: &Row| {
-            // Every free body of an island's rows is in `island.bodies`, which is sorted.
-            row.sides.map(|side| side.map(|(body, _)| island.bodies.partition_point(|b| *b < body)))
-        };
+        // Every free body of an island's rows is in `island.bodies`, which is sorted.
+        let place = |body: usize| island.bodies.partition_point(|b| *b < body);
         let placed = |&k: &usize| {
             let row = &rows[k];
             let (row, gap) = match (gap, row.resistance) {
@@ -121,7 +119,9 @@ impl Newton {
                 (Gap::Position, _) => (row, row.gap),
                 (Gap::Relaxed, _) => (row, row.relaxed_gap),
             };
-            Placed { row, bodies: place(row), gap, resistance: row.resistance }
+            let bodies = row.sides.map(|side| side.map(|(body, _)| place(body)));
+            let coupled = row.coupled.iter().map(|(body, _)| place(*body)).collect();
+            Placed { row, bodies, coupled, gap, resistance: row.resistance }
         };
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
         let inertia: Vec<_> = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
@@ -133,7 +133,8 @@ impl Newton {
         let asked = placed.iter().map(|placed| placed.gap.abs() / step.h).fold(0.0, f64::max);
         let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
         let minimum = problem.minimise(start.clone(), forces.as_deref());
-        if !self.is_wild(step, island, asked, [&of(&motion.target), &start], &minimum.velocity) {
+        let known = [problem.target(), &start];
+        if !self.is_wild(step, island, rows, asked, known, &minimum.velocity) {
             return minimum;
         }
         let soft = problem.softened();
@@ -143,13 +144,14 @@ impl Newton {
     }
 
     /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows
-    /// ask for, m/s or rad/s. Then rigid contacts contradict each other: a box between a plane and
-    /// a press that were 0.16 mm too near for it left sideways at 2 km/s, because its two sides
-    /// were touched along directions that differed by 70 µrad.
+    /// ask for, m/s or rad/s, also through the ratios of couplings. Then rigid contacts contradict
+    /// each other: a box between a plane and a press that were 0.16 mm too near for it left sideways
+    /// at 2 km/s, because its two sides were touched along directions that differed by 70 µrad.
     fn is_wild(
         &self,
         step: &Step,
         island: &Island,
+        rows: &[Row],
         asked: f64,
         known: [&[Vector6<f64>]; 2],
         found: &[Vector6<f64>],
@@ -163,7 +165,22 @@ impl Newton {
             velocities.iter().zip(sizes()).map(speed).fold(0.0, f64::max)
         };
         let asked = asked * sizes().fold(1.0, f64::max);
-        fastest(found) > STILL / step.h + WILD * (asked + fastest(known[0]).max(fastest(known[1])))
+        let known = asked + fastest(known[0]).max(fastest(known[1]));
+        let gain: f64 = island.rows.iter().map(|&k| self.gain(step, &rows[k])).product();
+        fastest(found) > STILL / step.h + WILD * gain * known
+    }
+
+    /// How much faster one body of a coupling is than another one; 1 for other rows.
+    fn gain(&self, step: &Step, row: &Row) -> f64 {
+        let rate = |(free, j): &(usize, Vector6<f64>)| {
+            let (linear, angular) = unpack(j);
+            linear.length() + angular.length() / self.sizes[step.free[*free].body]
+        };
+        let rates = || row.coupled.iter().map(rate);
+        match row.coupled.is_empty() {
+            true => 1.0,
+            false => rates().fold(0.0, f64::max) / rates().fold(f64::INFINITY, f64::min),
+        }
     }
 }
 

@@ -37,14 +37,14 @@ pub struct Step {
 impl Step {
     /// Whether a row has a body of an island that overlaps deeply.
     pub fn is_deep(&self, row: &Row) -> bool {
-        row.sides.iter().flatten().any(|(k, _)| self.deep[*k])
+        row.bodies().any(|(k, _)| self.deep[*k])
     }
 
     /// Whether a contact stays as it was found at the beginning of the step. A deep body that is
     /// pushed into another one must not kick it, and between bodies that rest nothing else would be
     /// found.
     pub fn stays(&self, row: &Row) -> bool {
-        self.is_deep(row) || row.sides.iter().flatten().all(|(k, _)| self.resting[*k])
+        self.is_deep(row) || row.bodies().all(|(k, _)| self.resting[*k])
     }
 
     /// Sets the targets so that the angular momenta that `velocities` have in the motion `plain`

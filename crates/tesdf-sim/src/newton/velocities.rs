@@ -122,7 +122,8 @@ impl Newton {
                 round += u32::from(hit.is_none());
                 let seen = hit.as_ref().map_or(&velocities, |hit| &hit.velocities).clone();
                 let is_hit = hit.as_ref().map_or(vec![false; seen.len()], |hit| hit.is_hit.clone());
-                let mut predicted = self.moved(step, &seen);
+                let moved = self.moved(step, &seen);
+                let mut predicted = moved.clone();
                 // The contacts of these bodies stay, so the detection need not look as far as they
                 // are pushed.
                 for (k, free) in step.free.iter().enumerate().filter(|(k, _)| step.deep[*k]) {
@@ -144,7 +145,7 @@ impl Newton {
                     next.extend_from_slice(held);
                     next.extend_from_slice(&joints);
                     let of_joints = next.len() - joints.len()..;
-                    predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
+                    predict(&mut next[of_joints], &self.gaps(step).bodies(), &moved, &seen, step.h);
                     (next, far)
                 };
                 if let Some(hit) = hit {

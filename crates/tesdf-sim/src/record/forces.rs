@@ -19,9 +19,9 @@ pub(super) struct ForceRows {
     pub points: Vec<[f64; 3]>,
     /// The force along the normal, then that of friction, N, world frame.
     pub contacts: Vec<[f32; 6]>,
-    /// Force on the child, N, its torque, N m, world frame, and what the motor does; for each joint
-    /// of each step.
-    pub joints: Vec<[f32; 7]>,
+    /// Force on the child, N, its torque, N m, world frame, what the motor and what couplings do; for
+    /// each joint of each step.
+    pub joints: Vec<[f32; 8]>,
 }
 
 impl ForceRows {
@@ -37,7 +37,7 @@ impl ForceRows {
         self.ends.push(self.ids.len() as u64);
         for joint in &forces.joints {
             let [f, t] = [joint.force, joint.torque].map(DVec3::as_vec3);
-            self.joints.push([f.x, f.y, f.z, t.x, t.y, t.z, joint.motor as f32]);
+            self.joints.push([f.x, f.y, f.z, t.x, t.y, t.z, joint.motor as f32, joint.coupling as f32]);
         }
     }
 
@@ -65,10 +65,11 @@ impl ForceRows {
                 friction,
             }
         };
-        let joint = |row: &[f32; 7]| JointForce {
+        let joint = |row: &[f32; 8]| JointForce {
             force: vector(&row[..3]),
             torque: vector(&row[3..6]),
             motor: f64::from(row[6]),
+            coupling: f64::from(row[7]),
         };
         Forces {
             contacts: self.contacts_at(place).map(contact).collect(),

@@ -342,7 +342,7 @@ fn read_state<'a>(mut payload: &'a [u8], run: &mut PartialRun) -> Option<&'a [u8
         forces.ids.extend(take::<[u32; 2]>(&mut payload, count)?);
         forces.points.extend(take::<[f64; 3]>(&mut payload, count)?);
         forces.contacts.extend(take::<[f32; 6]>(&mut payload, count)?);
-        forces.joints.extend(take::<[f32; 7]>(&mut payload, record.joints.len())?);
+        forces.joints.extend(take::<[f32; 8]>(&mut payload, record.joints.len())?);
         forces.steps.push(steps.checked_sub(1)?);
         forces.ends.push(forces.ids.len() as u64);
     }

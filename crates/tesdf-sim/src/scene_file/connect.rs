@@ -1,15 +1,15 @@
-//! Friction of pairs, joints and scripts of a scene.
+//! Friction of pairs, joints, their couplings and scripts of a scene.
 use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 
 use super::read::LoadedScene;
-use super::{JointSection, SceneError};
-use crate::script::Scripts;
-use crate::{Joint, System};
+use super::{CouplingSection, JointSection, SceneError};
+use crate::script::{Scripts, joint_named};
+use crate::{Coupling, Joint, System};
 
 impl LoadedScene {
-    /// Adds the friction of pairs, the excluded pairs and the joints to the system, and checks the
-    /// scripts.
+    /// Adds the friction of pairs, the excluded pairs, the joints and their couplings to the system,
+    /// and checks the scripts.
     pub(super) fn connect(&self, system: &mut System) -> Result<(), SceneError> {
         for (k, pair) in self.scene.friction.iter().enumerate() {
             let at = |reason: String| self.value("friction", format!("number {}: {reason}", k + 1));
@@ -29,6 +29,12 @@ impl LoadedScene {
             let joint = joint(system, section).map_err(at)?;
             system.add_joint(joint).map_err(|e| self.value("joints", e))?;
         }
+        for (k, section) in self.scene.couplings.iter().enumerate() {
+            let at = |reason: String| self.value("couplings", format!("number {}: {reason}", k + 1));
+            let coupling = coupling(system, section).map_err(at)?;
+            system.add_coupling(coupling).map_err(|e| at(e.to_string()))?;
+        }
+        system.check_couplings().map_err(|e| self.value("couplings", e))?;
         Scripts::new(&self.scene.scripts, system).map_err(|reason| self.value("scripts", reason))?;
         Ok(())
     }
@@ -57,6 +63,13 @@ fn joint(system: &System, section: &JointSection) -> Result<Joint, String> {
     let mut joint = Joint::new(&section.name, section.kind, (parent, child), poses, frame);
     joint.begin_at(section.coordinate)?;
     Ok(Joint { limits: section.limits, motor: section.motor, resistance: section.resistance, ..joint })
+}
+
+fn coupling(system: &System, section: &CouplingSection) -> Result<Coupling, String> {
+    let CouplingSection { joint, of, ratio, offset } = section;
+    let joint = joint_named(system, joint)?;
+    let of = joint_named(system, of)?;
+    Ok(Coupling { joint, of, ratio: *ratio, offset: *offset })
 }
 
 /// The numbers of two different bodies.

@@ -40,6 +40,11 @@
 //! axis = [0, 0, 1]
 //! motor = { drive = { velocity = 1.5 }, limit = 0.2 }    # rad/s, N m
 //!
+//! [[couplings]]                # joint "wheel" turns twice as far, the other way
+//! joint = "wheel"
+//! of = "spindle"
+//! ratio = -2
+//!
 //! [[scripts]]                  # the motor stops after a second
 //! joint = "spindle"
 //! interpolation = "step"
@@ -125,6 +130,9 @@ pub struct SceneFile {
     /// Joints between bodies, or a body and the world.
     #[serde(default)]
     pub joints: Vec<JointSection>,
+    /// Couplings of joints: gears, mimic joints.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub couplings: Vec<CouplingSection>,
     /// What drives kinematic bodies, motors and wrenches in time.
     #[serde(default)]
     pub scripts: Vec<Script>,
@@ -201,6 +209,23 @@ impl JointSection {
             resistance: JointResistance::default(),
         }
     }
+}
+
+/// Keeps the coordinate of a joint at `ratio` times that of another one, plus `offset`. Both are
+/// hinges or sliders, and whole turns of hinges count.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CouplingSection {
+    /// Name of the joint that follows.
+    pub joint: String,
+    /// Name of the joint that it follows.
+    pub of: String,
+    /// Change of its coordinate by that of the other one, in their units; not 0.
+    #[serde(default = "one")]
+    pub ratio: f64,
+    /// Its coordinate where that of the other one is 0, rad or m.
+    #[serde(default)]
+    pub offset: f64,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
@@ -524,6 +549,6 @@ pub struct RecordSection {
     /// records none. A contact takes 44 bytes.
     pub contacts_every: u32,
     /// The forces of contacts and joints are recorded at every step whose number, from 0, is a
-    /// multiple of this value; 0 records none. A contact that pushes takes 56 bytes, a joint 28.
+    /// multiple of this value; 0 records none. A contact that pushes takes 56 bytes, a joint 32.
     pub forces_every: u32,
 }

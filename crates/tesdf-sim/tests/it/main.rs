@@ -1,6 +1,7 @@
 //! The tests of `tesdf-sim` over several of its modules, in one program.
 mod analytic;
 mod chain;
+mod couplings;
 mod deep;
 mod forces;
 mod friction;

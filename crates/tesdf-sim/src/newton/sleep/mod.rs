@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 
 use tesdf::collide::{Contact, Contacts, HiddenOverlap, InstanceId, Pose};
 
-use crate::{Mass, State, System};
+use crate::{Joint, Mass, State, System};
 
 /// A body is at rest as long as no point of it has left its place by more than this, m, or its
 /// velocity would take it that far in a step. The solver moves bodies at rest by 0.1 nm a step at most, and by
@@ -184,9 +184,17 @@ fn is_free(system: &System, body: usize) -> bool {
     matches!(system.bodies()[body].mass, Mass::Free(_))
 }
 
-/// The pairs of bodies that joints connect.
+/// The pairs of bodies that joints and their couplings connect.
 pub fn joined(system: &System) -> impl Iterator<Item = [usize; 2]> {
-    system.joints().iter().filter_map(|joint| Some([joint.parent?, joint.child]))
+    let of_joints = system.joints().iter().filter_map(|joint| Some([joint.parent?, joint.child]));
+    let bodies = |joint: usize| {
+        let Joint { child, parent, .. } = &system.joints()[joint];
+        [Some(*child), *parent].into_iter().flatten()
+    };
+    let of_couplings = system.couplings().iter().flat_map(move |coupling| {
+        bodies(coupling.joint).flat_map(move |a| bodies(coupling.of).map(move |b| [a, b]))
+    });
+    of_joints.chain(of_couplings.filter(|[a, b]| a != b))
 }
 
 /// The pairs of bodies of contacts.
