@@ -11,6 +11,8 @@ use crate::MassProperties;
 pub struct Robot {
     /// The links.
     pub links: Vec<Link>,
+    /// Joints that follow others.
+    pub couplings: Vec<RobotCoupling>,
     /// Pairs of links that have no contacts with each other.
     pub apart: Vec<[usize; 2]>,
     /// Elements that neither bodies nor joints obey, and what they are: who reads them may refuse
@@ -21,9 +23,26 @@ pub struct Robot {
 /// An element of a description that has an effect there and none here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unread {
-    /// Name of the element, such as `mimic`.
+    /// Name of the element, such as `actuator`.
     pub element: String,
     /// Where it is and what it does.
+    pub place: String,
+}
+
+/// A joint that follows another one: `mimic` of URDF, and `joint` of `equality` of MJCF.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobotCoupling {
+    /// Name of the joint that follows.
+    pub joint: String,
+    /// Name of the joint that it follows.
+    pub of: String,
+    /// Change of its coordinate by that of the other one.
+    pub ratio: f64,
+    /// Its coordinate where that of the other one is 0, rad or m.
+    pub offset: f64,
+    /// Name of the element.
+    pub element: &'static str,
+    /// Where it is, for messages.
     pub place: String,
 }
 

@@ -9,9 +9,10 @@ use glam::{DMat3, DQuat, DVec3};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Body, Geom, GeomType, InertiaSpec, Joint, JointType};
 use mjcf_rs::compiler::InertiaFromGeom;
+use mjcf_rs::equality::{Equality, EqualityJoint};
 use tesdf::collide::Pose;
 
-use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, Unread};
+use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint, Unread};
 use super::{RobotError, expand, parse, solids};
 use crate::{MassProperties, inertia_matrix};
 
@@ -19,7 +20,7 @@ use crate::{MassProperties, inertia_matrix};
 const DENSITY: f64 = 1000.0;
 
 /// Sections of a model that are not simulated.
-const SECTIONS: [&str; 4] = ["equality", "tendon", "actuator", "deformable"];
+const SECTIONS: [&str; 3] = ["tendon", "actuator", "deformable"];
 /// Elements of bodies that are not simulated.
 const OF_BODIES: [&str; 4] = ["composite", "flexcomp", "plugin", "replicate"];
 
@@ -47,6 +48,16 @@ pub(super) fn read_mjcf(path: &Path) -> Result<Robot, RobotError> {
     let pairs = model.contact.excludes.iter().map(|pair| Ok([body(&pair.body1)?, body(&pair.body2)?]));
     let pairs = pairs.collect::<Result<Vec<_>, RobotError>>()?;
     robot.apart = pairs;
+    for equality in &model.equality {
+        if let Equality::Joint(joint) = equality
+            && joint.common.active
+        {
+            match file.coupling(joint) {
+                Ok(coupling) => robot.couplings.push(coupling),
+                Err(unread) => robot.unread.push(unread),
+            }
+        }
+    }
     Ok(robot)
 }
 
@@ -67,6 +78,9 @@ fn check(path: &Path, text: &str, unread: &mut Vec<Unread>) -> Result<(), RobotE
                 if SECTIONS.contains(&section) && node.children().any(|child| child.is_element()) =>
             {
                 leave(section, &format!("there is <{section}>"));
+            }
+            ("equality", element) if element != "joint" => {
+                leave("equality", &format!("there is <{element}> in <equality>"));
             }
             ("contact", "pair") => leave("pair", "a <pair> of geoms has its own contacts"),
             ("body" | "worldbody" | "frame", element) if OF_BODIES.contains(&element) => {
@@ -282,6 +296,25 @@ impl File<'_> {
         let limits = range.map(|range| if degrees { range.map(f64::to_radians) } else { range });
         let anchor = DVec3::from_array(joint.pos);
         Ok(RobotJoint { name, motion, anchor, axis, limits, damping, friction, armature, ..fixed })
+    }
+
+    /// `Err` where it is no linear function of another joint.
+    fn coupling(&self, equality: &EqualityJoint) -> Result<RobotCoupling, Unread> {
+        let EqualityJoint { joint1, joint2, polycoef: [offset, ratio, higher @ ..], .. } = equality;
+        let place = format!("{}: the equality of the joint {joint1}", self.path.display());
+        let unread = |what: &str| Unread { element: "equality".into(), place: format!("{place} {what}") };
+        let of = joint2.as_ref().ok_or_else(|| unread("keeps it where it is"))?;
+        if higher.iter().any(|coefficient| *coefficient != 0.0) {
+            return Err(unread("has a polycoef that is not linear"));
+        }
+        Ok(RobotCoupling {
+            joint: joint1.clone(),
+            of: of.clone(),
+            ratio: *ratio,
+            offset: *offset,
+            element: "equality",
+            place,
+        })
     }
 
     /// The geometry of a geom; `None` where it is not simulated.

@@ -14,7 +14,9 @@ mod urdf;
 
 use std::path::{Path, PathBuf};
 
-pub use description::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, Unread, composed};
+pub use description::{
+    Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint, Unread, composed,
+};
 pub use include::expand;
 pub use packages::Packages;
 pub use urdf::mesh_reference;

@@ -9,7 +9,7 @@ use glam::{DMat3, DQuat, DVec3};
 use roxmltree::{Document, Node};
 use tesdf::collide::Pose;
 
-use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, Unread};
+use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint};
 use super::{Packages, RobotError, parse, read};
 use crate::{MassProperties, inertia_matrix};
 
@@ -165,7 +165,7 @@ impl<'a> File<'a> {
             let base = match above.get(name) {
                 None => Base::Root { pose: Pose::IDENTITY, is_fixed: None },
                 Some(&(parent, joint)) => {
-                    Base::Joint(self.joint(joint, places[parent], &mut found.unread)?)
+                    Base::Joint(self.joint(joint, places[parent], &mut found.couplings)?)
                 }
             };
             places.insert(name, found.links.len());
@@ -252,7 +252,7 @@ impl<'a> File<'a> {
         &self,
         node: Node<'a, 'a>,
         parent: usize,
-        unread: &mut Vec<Unread>,
+        couplings: &mut Vec<RobotCoupling>,
     ) -> Result<RobotJoint, RobotError> {
         let name = self.text(node, "name")?;
         let kind = self.text(node, "type")?;
@@ -295,9 +295,15 @@ impl<'a> File<'a> {
         };
         let moves = matches!(motion, Motion::Hinge | Motion::Slider);
         if let Some(mimic) = child(node, "mimic").filter(|_| moves) {
-            let place = format!("{}, line {}", self.path.display(), self.line(mimic));
-            let place = format!("{place}: the joint {name} follows another one");
-            unread.push(Unread { element: "mimic".into(), place });
+            let number = |name| Ok::<_, RobotError>(self.numbers::<1>(mimic, name)?.map(|[x]| x));
+            couplings.push(RobotCoupling {
+                joint: name.to_owned(),
+                of: self.text(mimic, "joint")?.to_owned(),
+                ratio: number("multiplier")?.unwrap_or(1.0),
+                offset: number("offset")?.unwrap_or(0.0),
+                element: "mimic",
+                place: format!("{}, line {}", self.path.display(), self.line(mimic)),
+            });
         }
         Ok(RobotJoint {
             name: name.to_owned(),

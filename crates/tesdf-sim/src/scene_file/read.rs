@@ -113,9 +113,11 @@ impl LoadedScene {
                 SceneError::Value { path: self.path.clone(), line, key, reason }
             };
             let robot = self.robot(&section).map_err(|e| at(e.to_string()))?;
-            let Expanded { bodies, joints, exclude } = robots::expand(&section, &robot).map_err(at)?;
+            let expanded = robots::expand(&section, &robot).map_err(at)?;
+            let Expanded { bodies, joints, couplings, exclude } = expanded;
             self.scene.bodies.extend(bodies.into_iter().map(|body| Spanned::new(span.clone(), body)));
             self.scene.joints.extend(joints);
+            self.scene.couplings.extend(couplings);
             self.scene.exclude.extend(exclude);
         }
         Ok(self)

@@ -7,9 +7,9 @@ use tesdf::collide::Pose;
 use tesdf::glam::{DMat3, DQuat, DVec3};
 
 use super::parts::{PartSection, PartShape};
-use super::{BodySection, ExcludeSection, JointSection, identity};
-use crate::joint::relative;
-use crate::robot::{Base, Collision, Geometry, Link, Motion, Robot, RobotJoint, composed};
+use super::{BodySection, CouplingSection, ExcludeSection, JointSection, identity};
+use crate::joint::{relative, wrapped};
+use crate::robot::{Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint, composed};
 use crate::{Drive, JointKind, JointResistance, MassProperties, Motor};
 
 /// Greatest number of links of a robot: pairs of them are listed.
@@ -34,7 +34,7 @@ pub struct RobotSection {
     #[serde(default = "identity")]
     pub rotation: [f64; 4],
     /// Coordinates of joints at the start, rad or m, by the joint's name in the file; others are 0,
-    /// or the nearest number within their limits.
+    /// or the nearest number within their limits, or follow from that of a joint that they follow.
     #[serde(default)]
     pub coordinates: BTreeMap<String, f64>,
     /// Motors of joints, by the joint's name in the file.
@@ -53,8 +53,8 @@ pub struct RobotSection {
     /// Folders of packages, by name.
     #[serde(default)]
     pub packages: BTreeMap<String, PathBuf>,
-    /// Elements of the file that have no effect here, and that are left out, such as `mimic`.
-    /// Without it they are an error.
+    /// Elements of the file that are left out, such as `actuator`: those that have no effect here,
+    /// which are an error otherwise, and `mimic` or `equality`.
     #[serde(default)]
     pub ignore: Vec<String>,
 }
@@ -74,11 +74,12 @@ fn yes() -> bool {
     true
 }
 
-/// The bodies, joints and pairs without contacts of a robot.
+/// The bodies, joints, couplings and pairs without contacts of a robot.
 #[derive(Default)]
 pub(super) struct Expanded {
     pub bodies: Vec<BodySection>,
     pub joints: Vec<JointSection>,
+    pub couplings: Vec<CouplingSection>,
     pub exclude: Vec<ExcludeSection>,
 }
 
@@ -112,6 +113,7 @@ pub(super) fn expand(section: &RobotSection, robot: &Robot) -> Result<Expanded, 
         return Err("fixed: MJCF says itself what is fixed: all bodies without a joint; leave it out".into());
     }
     let mut builder = Builder::new(section, robot)?;
+    builder.check_couplings()?;
     for link in 0..robot.links.len() {
         builder.place(link)?;
     }
@@ -122,6 +124,10 @@ struct Builder<'a> {
     section: &'a RobotSection,
     robot: &'a Robot,
     start: Pose,
+    /// The joints that turn or slide.
+    moving: Vec<&'a RobotJoint>,
+    /// The couplings that are not left out.
+    couplings: Vec<&'a RobotCoupling>,
     /// Coordinates and motors that no joint has had so far.
     coordinates: BTreeMap<&'a str, f64>,
     motors: BTreeMap<&'a str, RobotMotor>,
@@ -142,10 +148,18 @@ impl<'a> Builder<'a> {
     fn new(section: &'a RobotSection, robot: &'a Robot) -> Result<Self, String> {
         let rotation = DQuat::from_array(section.rotation);
         let start = Pose::new(DVec3::from_array(section.translation), rotation).map_err(|e| e.to_string())?;
+        let moving = robot.links.iter().filter_map(|link| match &link.base {
+            Base::Joint(joint) if matches!(joint.motion, Motion::Hinge | Motion::Slider) => Some(joint),
+            _ => None,
+        });
+        let couplings = robot.couplings.iter();
+        let couplings = couplings.filter(|coupling| !section.ignore.iter().any(|e| e == coupling.element));
         Ok(Self {
             section,
             robot,
             start,
+            moving: moving.collect(),
+            couplings: couplings.collect(),
             coordinates: section.coordinates.iter().map(|(name, &x)| (name.as_str(), x)).collect(),
             motors: section.motors.iter().map(|(name, &motor)| (name.as_str(), motor)).collect(),
             places: Vec::new(),
@@ -160,6 +174,44 @@ impl<'a> Builder<'a> {
 
     fn name(&self, name: &str) -> String {
         format!("{}{name}", self.section.prefix)
+    }
+
+    /// The names of the joints that turn or slide.
+    fn moving_names(&self) -> String {
+        self.moving.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    fn moving(&self, name: &str) -> Option<&'a RobotJoint> {
+        self.moving.iter().copied().find(|joint| joint.name == name)
+    }
+
+    /// The coupling by which a joint follows another one.
+    fn following(&self, name: &str) -> Option<&'a RobotCoupling> {
+        self.couplings.iter().copied().find(|coupling| coupling.joint == name)
+    }
+
+    /// Checks what couplings couple.
+    fn check_couplings(&self) -> Result<(), String> {
+        for (k, RobotCoupling { joint, of, ratio, place, .. }) in self.couplings.iter().enumerate() {
+            if let Some(name) = [joint, of].into_iter().find(|name| self.moving(name).is_none()) {
+                let found = format!("{place}: there is no joint {name} that turns or slides");
+                return Err(format!("{found}; expected one of {}", self.moving_names()));
+            }
+            if *ratio == 0.0 {
+                let found = format!("{place}: the joint {joint} follows {of} with the ratio 0");
+                return Err(format!("{found}; expected another number, or a joint that is fixed"));
+            }
+            if let Some(other) = self.couplings[..k].iter().find(|other| other.joint == *joint) {
+                let found = format!("{place}: the joint {joint} follows both {} and {of}", other.of);
+                return Err(format!("{found}; expected one of them"));
+            }
+            let next = |name: &&'a str| self.following(name).map(|coupling| coupling.of.as_str());
+            let followed = std::iter::successors(Some(joint.as_str()), next).skip(1);
+            if followed.take(self.couplings.len()).any(|name| name == joint) {
+                return Err(format!("{place}: the joint {joint} follows itself; take one coupling out"));
+            }
+        }
+        Ok(())
     }
 
     fn place(&mut self, k: usize) -> Result<(), String> {
@@ -236,8 +288,13 @@ impl<'a> Builder<'a> {
     }
 
     /// The coordinate of a joint at the start.
-    fn coordinate(&mut self, joint: &RobotJoint) -> Result<f64, String> {
-        let given = self.coordinates.get(joint.name.as_str()).copied();
+    fn coordinate(&self, joint: &RobotJoint) -> Result<f64, String> {
+        let given = self.section.coordinates.get(&joint.name).copied();
+        if let (None, Some(coupling)) = (given, self.following(&joint.name))
+            && let Some(followed) = self.moving(&coupling.of)
+        {
+            return Ok(coupling.ratio * self.coordinate(followed)? + coupling.offset);
+        }
         match (given, joint.limits) {
             (Some(_), _) if joint.motion == Motion::Ball => {
                 Err(format!("coordinates: {} is a ball, which has none; leave it out", joint.name))
@@ -325,8 +382,12 @@ impl<'a> Builder<'a> {
     }
 
     fn joint(&mut self, joint: &RobotJoint, k: usize) -> Result<(), String> {
-        let coordinate = self.coordinate(joint)?;
-        self.coordinates.remove(joint.name.as_str());
+        let mut coordinate = self.coordinate(joint)?;
+        let is_given = self.coordinates.remove(joint.name.as_str()).is_some();
+        if !is_given && joint.motion == Motion::Hinge {
+            // Of a joint that follows another one. The coupling counts its turns.
+            coordinate = wrapped(coordinate);
+        }
         let kind = match joint.motion {
             Motion::Hinge => JointKind::Hinge,
             Motion::Slider => JointKind::Slider,
@@ -362,25 +423,24 @@ impl<'a> Builder<'a> {
         let body = |link: usize| self.places[link].body;
         let apart = self.robot.apart.iter().filter_map(|&[a, b]| Some([body(a)?, body(b)?]));
         self.apart = apart.map(|[a, b]| [a.min(b), a.max(b)]).collect();
-        let joints = || {
-            let moves = |link: &'a Link| match &link.base {
-                Base::Joint(joint) if matches!(joint.motion, Motion::Hinge | Motion::Slider) => Some(joint),
-                _ => None,
-            };
-            let names = self.robot.links.iter().filter_map(moves).map(|joint| joint.name.as_str());
-            names.collect::<Vec<_>>().join(", ")
-        };
         let unused = self.coordinates.keys().map(|name| ("coordinates", name));
         let unused = unused.chain(self.motors.keys().map(|name| ("motors", name))).next();
         if let Some((key, name)) = unused {
             return Err(format!(
                 "{key}: the robot has no joint {name} that turns or slides; expected one of {}",
-                joints()
+                self.moving_names()
             ));
         }
         let bodies = self.links.iter().zip(&self.parts).map(|(&k, parts)| self.body(k, parts)).collect();
         let exclude = self.pairs().collect();
-        Ok(Expanded { bodies, joints: self.joints, exclude })
+        let couplings = self.couplings.iter().map(|coupling| CouplingSection {
+            joint: self.name(&coupling.joint),
+            of: self.name(&coupling.of),
+            ratio: coupling.ratio,
+            offset: coupling.offset,
+        });
+        let couplings = couplings.collect();
+        Ok(Expanded { bodies, joints: self.joints, couplings, exclude })
     }
 
     /// The pairs of bodies without contacts.

@@ -2,6 +2,7 @@
 use std::path::{Path, PathBuf};
 
 use tesdf::glam::{DAffine3, DMat3, DVec3};
+use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::{LoadedScene, SceneError};
 use tesdf_sim::{Dynamics, Mass, System};
 
@@ -199,15 +200,6 @@ fn a_frame_without_mass_is_a_part_of_what_is_fixed_to_it() {
 
 #[test]
 fn what_cannot_be_simulated_is_refused_with_its_place_and_a_cure() {
-    let mimic = FINGERS.replace("<child link=\"two\"/>", "<child link=\"two\"/>\n<mimic joint=\"j1\"/>");
-    let told = refusal(&mimic, "");
-    assert!(told.contains("scene.toml, line 4: robots: robot.urdf: "), "{told}");
-    assert!(
-        told.contains("robot.urdf, line 8: the joint j2 follows another one")
-            && told.contains("ignore = [\"mimic\"]"),
-        "{told}"
-    );
-    assert!(load_text(&mimic, "ignore = ['mimic']").is_ok());
     for (from, to, keys, expected) in [
         ("prismatic", "planar", "", "line 4: the joint j1 is planar; expected two prismatic"),
         ("prismatic", "odd", "", "the type of the joint j1 is 'odd'; expected revolute"),
@@ -243,6 +235,70 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_a_cure() {
     }
     let told = LoadedScene::read(data().join("peg-arm.urdf")).expect_err("it was read").to_string();
     assert!(told.contains("a robot description; give it a scene: [[robots]]"), "{told}");
+}
+
+/// Fingers that mimic: the second one of the first one, in a file where it comes before it, and a
+/// wheel of the second one. All follow the coordinate of the first one at the start and in the run.
+#[test]
+fn mimic_joints_follow() {
+    let wheel = r#"<joint name="wheel" type="continuous"><parent link="palm"/><child link="wheel"/><axis xyz="0 0 1"/><mimic joint="j1" multiplier="40" offset="0.5"/></joint>
+      <link name="wheel"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link></robot>"#;
+    let mimic = r#"<child link="one"/><mimic joint="j1" multiplier="-2" offset="0.01"/>"#;
+    let urdf = FINGERS.replace("</robot>", wheel).replace("j1", "j0").replace("j2", "j1").replace("j0", "j2");
+    let urdf = urdf.replace(r#"<child link="one"/>"#, mimic);
+    let keys = "prefix = 'left/'
+fixed = true
+self_contacts = false
+coordinates = { j1 = 0.1 }
+                motors = { j1 = { drive = { velocity = -0.2 }, limit = inf } }";
+    let loaded = load_text(&urdf, keys).unwrap();
+    let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
+    let check = |engine: &Newton, expected: f64, exact: f64| {
+        let system = engine.system();
+        let of = |name: &str| {
+            let joint = system.joints().iter().position(|joint| joint.name == name).unwrap();
+            system.coordinates()[joint]
+        };
+        let [one, two, wheel] = ["left/j1", "left/j2", "left/wheel"].map(of);
+        assert!((one - expected).abs() < 1e-6, "{one}, not {expected}");
+        assert!((two - (0.01 - 2.0 * one)).abs() < exact, "{two}");
+        // More than a turn.
+        assert!((wheel - (0.5 + 40.0 * two)).abs() < exact, "{wheel}");
+    };
+    check(&engine, 0.1, 1e-9);
+    for _ in 0..100 {
+        assert!(engine.step(1e-3).unwrap().converged);
+    }
+    check(&engine, 0.08, 1e-9);
+    // Left out, they are joints on their own.
+    let loaded = load_text(
+        &urdf,
+        "fixed = true
+ignore = ['mimic']",
+    )
+    .unwrap();
+    assert!(loaded.scene.couplings.is_empty());
+    for (from, to, expected) in [
+        (
+            r#"joint="j1""#,
+            r#"joint="j3""#,
+            "line 4: there is no joint j3 that turns or slides; expected one of j2, j1",
+        ),
+        (r#"joint="j1""#, r#"joint="j2""#, "the joint j2 follows itself"),
+        (r#"joint="j1""#, r#"joint="wheel""#, "follows itself; take one coupling out"),
+        (r#"joint="j1" "#, "", "line 4: <mimic> has no joint; expected one"),
+        (r#"multiplier="-2""#, r#"multiplier="0""#, "the joint j2 follows j1 with the ratio 0"),
+        (r#"multiplier="-2""#, r#"multiplier="x""#, "multiplier of <mimic> is 'x'; expected a finite number"),
+    ] {
+        let told = refusal(&urdf.replacen(from, to, 1), "fixed = true");
+        assert!(told.contains(expected), "{told}\nexpected {expected}");
+    }
+    let told = refusal(&urdf, "fixed = true\ncoordinates = { j2 = 0.3 }");
+    assert!(
+        told.contains("couplings: joint j2: its coordinate is 0.3")
+            && told.contains("; expected 0.01: it follows j1"),
+        "{told}"
+    );
 }
 
 /// A free base with an arm: a class of defaults, an include, masses of geoms, and a mesh that is
@@ -343,6 +399,26 @@ fn what_mjcf_has_and_a_scene_has_not_is_refused() {
         ("axis=\"0 1 0\"", "axis=\"0 1 0\" ref=\"3\"", "the joint elbow has ref"),
         ("axis=\"0 1 0\"", "axis=\"0 0 0\"", "the axis of the joint elbow"),
         (
+            "<contact>",
+            "<equality><joint joint1='elbow' joint2='body3' polycoef='0 1 2 0 0'/></equality><contact>",
+            "the equality of the joint elbow has a polycoef that is not linear, which is not simulated",
+        ),
+        (
+            "<contact>",
+            "<equality><joint joint1='elbow'/></equality><contact>",
+            "the equality of the joint elbow keeps it where it is, which is not simulated",
+        ),
+        (
+            "<contact>",
+            "<equality><joint joint1='elbow' joint2='root'/></equality><contact>",
+            "the equality of the joint elbow: there is no joint root that turns or slides",
+        ),
+        (
+            "<contact>",
+            "<equality><joint joint1='elbow' joint2='body3'/><joint joint1='elbow' joint2='body3'/></equality><contact>",
+            "the joint elbow follows both body3 and body3",
+        ),
+        (
             "<joint name=\"elbow\"",
             "<joint name='other'/><joint name=\"elbow\"",
             "body arm: it has 2 joints; expected one",
@@ -362,6 +438,12 @@ fn what_mjcf_has_and_a_scene_has_not_is_refused() {
         )
         .is_ok()
     );
+    let equality = "<equality><joint joint1='elbow' joint2='body3' polycoef='0.1 -2 0 0 0'/>\
+                    <joint joint1='body3' joint2='elbow' active='false'/></equality><contact>";
+    let loaded = mjcf(&MJCF.replacen("<contact>", equality, 1), "").unwrap();
+    let [coupling] = loaded.scene.couplings.as_slice() else { panic!("{:?}", loaded.scene.couplings) };
+    assert_eq!((coupling.joint.as_str(), coupling.of.as_str()), ("elbow", "body3"));
+    assert_eq!((coupling.ratio, coupling.offset), (-2.0, 0.1));
     let told = mjcf(MJCF, "fixed = true").expect_err("it was accepted").to_string();
     assert!(told.contains("MJCF says itself"), "{told}");
 }
