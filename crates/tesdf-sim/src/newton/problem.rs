@@ -226,7 +226,8 @@ mod tests {
         let inertia = free.iter().map(|body| body.inertia).collect();
         let placed = |row: &'a Row| {
             let bodies = row.sides.map(|side| side.map(|(body, _)| body));
-            Placed { row, bodies, coupled: Vec::new(), gap: row.gap, resistance: row.resistance }
+            let coupled = row.coupled.iter().map(|(body, _)| *body).collect();
+            Placed { row, bodies, coupled, gap: row.gap, resistance: row.resistance }
         };
         Problem::new(inertia, target.to_vec(), rows.iter().map(placed).collect(), H)
     }
@@ -256,9 +257,12 @@ mod tests {
                 lack[*body] += j * (H * force.along) + pack(friction, arm.cross(friction));
             }
             let gap = row.gap + H * row.rate(&found.velocity);
+            for (body, j) in &row.coupled {
+                lack[*body] += j * (H * force.along);
+            }
             // A force that a spring with this kept force has again.
             let of_side = |(body, j): &(usize, Vector6<f64>)| j.dot(&(free[*body].inverse * j));
-            let per_gap = 1.0 / (H * H * row.sides.iter().flatten().map(of_side).sum::<f64>());
+            let per_gap = 1.0 / (H * H * row.bodies().map(of_side).sum::<f64>());
             let again = match row.resistance {
                 Resistance::Rigid => force.along - per_gap * gap,
                 Resistance::Spring | Resistance::Parting => -30.0 / (H * H) * gap,
@@ -315,13 +319,13 @@ mod tests {
         assert!(unsolved <= 3, "{unsolved}");
     }
 
-    /// Joints, motors of a limited force, springs and given forces beside contacts.
+    /// Joints, couplings, motors of a limited force, springs and given forces beside contacts.
     #[test]
     fn rows_of_all_kinds_keep_their_laws() {
         for seed in 0..40 {
             let random = &mut fastrand::Rng::with_seed(seed);
             let (free, target) = (bodies(10.0, random), velocities(random));
-            let mut rows = contacts(60, 0.1, random);
+            let mut rows = contacts(40, 0.1, random);
             for (k, row) in rows.iter_mut().enumerate().take(16) {
                 row.friction = None;
                 (row.bounds, row.resistance) = match k % 4 {
@@ -332,6 +336,10 @@ mod tests {
                 };
             }
             rows[15].bounds = [20.0; 2];
+            for (row, bodies) in rows.iter_mut().step_by(4).zip([&[0, 1, 3, 4][..], &[1, 2, 4]]) {
+                row.sides = [None; 2];
+                row.coupled = bodies.iter().map(|body| (*body, velocities(random)[0])).collect();
+            }
             let found = problem(&free, &target, &rows).minimise(target.clone(), None);
             assert!(found.converged, "seed {seed}");
             assert_eq!(found.forces[15].along, 20.0);
