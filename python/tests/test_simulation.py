@@ -207,6 +207,40 @@ def test_forces_are_the_weight_and_what_motors_do():
     assert np.linalg.norm(joints.forces[0]) == pytest.approx(2 * 0.1 * 15**2, abs=25)
 
 
+def test_coupled_joints_follow_and_tell_their_force():
+    finger = {"shape": tesdf.Box((0.01, 0.01, 0.02)), "mass": 0.1}
+    scene = {
+        "time_step": 2e-3,
+        "duration": 1,
+        "gravity": [0, 0, 0],
+        "bodies": [
+            {"name": "left", **finger, "translation": [0, 0.1, 0]},
+            {"name": "right", **finger, "translation": [0, -0.1, 0]},
+        ],
+        "joints": [
+            {"name": "left", "kind": "slider", "child": "left", "axis": [0, 1, 0]},
+            {"name": "right", "kind": "slider", "child": "right", "axis": [0, 1, 0]},
+        ],
+        "couplings": [{"joint": "right", "of": "left", "ratio": -2}],
+        "record": {"forces_every": 1},
+    }
+    simulation = tesdf.Simulation(scene)
+    simulation.set_wrench("left", force=[0, -0.5, 0])
+    simulation.step(100)
+    # 0.1 kg, and four times that of the other finger.
+    acceleration = -0.5 / (0.1 + 4 * 0.1)
+    left, right = simulation.coordinates
+    assert left == pytest.approx(0.5 * acceleration * 0.2 * 0.202, rel=1e-9)
+    assert right == pytest.approx(-2 * left, abs=1e-9)
+    forces = simulation.joint_forces
+    assert forces.couplings == pytest.approx([0.4 * -acceleration, 0.2 * -acceleration], rel=1e-9)
+    assert forces.forces[1] == pytest.approx([0, forces.couplings[1], 0], abs=1e-12)
+    assert simulation.record().joint_forces.couplings[-2:] == pytest.approx(forces.couplings, rel=1e-6)
+    scene["couplings"][0]["of"] = "middle"
+    with pytest.raises(tesdf.SceneError, match="couplings: number 1: there is no joint middle"):
+        tesdf.Simulation(scene)
+
+
 def test_motors_wrenches_and_states_are_set_between_steps():
     simulation = tesdf.Simulation(SLIDER)
     assert simulation.joints == ["slide"] and simulation.coordinates.tolist() == [0]

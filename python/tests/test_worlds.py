@@ -171,6 +171,7 @@ def test_worlds_are_single_simulations(threads):
         assert np.array_equal(forces.forces[k], single.joint_forces.forces)
         assert np.array_equal(forces.torques[k], single.joint_forces.torques)
         assert np.array_equal(forces.motors[k], single.joint_forces.motors)
+        assert np.array_equal(forces.couplings[k], single.joint_forces.couplings)
         assert np.array_equal(worlds.contacts(k).distance, single.contacts.distance)
         assert np.array_equal(worlds.contact_forces(k).normal_forces, single.contact_forces.normal_forces)
         for body in range(3):

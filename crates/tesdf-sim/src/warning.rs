@@ -5,7 +5,7 @@ use tesdf::collide::{CollideError, InstancePair, PenetrationOptions, deepest_pen
 use crate::criterion::JointDrift;
 use crate::scene_file::SceneFile;
 use crate::totals::Totals;
-use crate::{HiddenPair, Mass, Residual, System};
+use crate::{HiddenPair, JointKind, Mass, Residual, System};
 
 /// Joints that come farther apart than this fraction of the diagonal of their child are told.
 const APART: f64 = 1e-3;
@@ -31,7 +31,7 @@ pub enum WarningKind {
     Hidden,
     /// Bodies overlap deeply at the end. The value is the depth by the exact clearance, m.
     Overlap,
-    /// A joint came apart. The value is the distance, m.
+    /// A joint came apart, or its coupling with another one does not hold. The value is the distance, m.
     Joint,
     /// Energy grew while nothing drove the bodies. The value is the gain, J.
     Energy,
@@ -136,6 +136,14 @@ impl Watch {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
             let size = self.sizes.get(joint.child).copied().unwrap_or(0.0);
             apart.observe(distance, angle, size, time);
+        }
+        for coupling in system.couplings() {
+            let coordinates = system.coordinates();
+            let error = (coordinates[coupling.joint] - coupling.target(coordinates)).abs();
+            let joint = &system.joints()[coupling.joint];
+            let size = self.sizes.get(joint.child).copied().unwrap_or(0.0);
+            let [distance, angle] = if joint.kind == JointKind::Slider { [error, 0.0] } else { [0.0, error] };
+            self.joints[coupling.joint].observe(distance, angle, size, time);
         }
         self.energy.observe(system, before, time);
     }

@@ -1,7 +1,9 @@
 //! Couplings of joints against analytic cases.
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::LoadedScene;
-use tesdf_sim::{Drive, Dynamics, Motor, State};
+use tesdf_sim::{Drive, Dynamics, Motor, State, WarningKind};
+
+use crate::support::run;
 
 const G: f64 = 9.81;
 
@@ -339,6 +341,24 @@ fn snapshots_and_resets_keep_couplings() {
     assert!(told.contains("joint two: its coordinate is") && told.contains("it follows one"), "{told}");
     assert_eq!(engine.system().states(), before.states());
     assert_eq!(engine.system().coordinates(), before.coordinates());
+}
+
+/// A motor of any force against a limit of the joint that is coupled to it.
+#[test]
+fn a_coupling_that_cannot_hold_is_told() {
+    let text = begin([0.0; 3])
+        + &bar("one", [0.0; 3])
+        + &bar("two", [1.0, 0.0, 0.0])
+        + &joint("driven", "slider", "one", "motor = { drive = { velocity = 5 }, limit = inf }")
+        + &joint("stops", "slider", "two", "limits = [0, 0.1]")
+        + &couple("driven", "stops", 1.0, 0.0);
+    let told = |text: &str| {
+        let loaded = load(&text.replace("duration = 1\n", "duration = 0.03\n"));
+        let (_, summary) = run(&loaded, loaded.system().unwrap());
+        summary.warnings.iter().map(|w| (w.kind, w.names.clone())).collect::<Vec<_>>()
+    };
+    assert!(told(&text).contains(&(WarningKind::Joint, vec!["driven".into()])), "{:?}", told(&text));
+    assert_eq!(told(&text.replace("limits = [0, 0.1]", "")), []);
 }
 
 #[test]
