@@ -97,7 +97,8 @@ impl Couplings {
         Ok(())
     }
 
-    /// Counts the turns of hinges that follow others so that their couplings hold, up to half a turn.
+    /// Counts the turns of hinges that follow others so that their couplings hold, up to half a
+    /// turn.
     pub fn count_turns(&self, joints: &[Joint], coordinates: &mut [f64]) {
         for coupling in self.order.iter().map(|&k| &self.all[k]) {
             if joints[coupling.joint].kind == JointKind::Hinge {

@@ -31,7 +31,8 @@ pub enum WarningKind {
     Hidden,
     /// Bodies overlap deeply at the end. The value is the depth by the exact clearance, m.
     Overlap,
-    /// A joint came apart, or its coupling with another one does not hold. The value is the distance, m.
+    /// A joint came apart, or its coupling with another one does not hold. The value is the
+    /// distance, m.
     Joint,
     /// Energy grew while nothing drove the bodies. The value is the gain, J.
     Energy,

@@ -112,8 +112,9 @@ impl Newton {
         (left / parts).max(whole / PARTS).min(left)
     }
 
-    /// The greatest error of a joint or a coupling: its distance as part of the child's diagonal, or
-    /// its angle, rad. The states are those after a motion of `time` seconds at their velocities.
+    /// The greatest error of a joint or a coupling: its distance as part of the child's diagonal,
+    /// or its angle, rad. The states are those after a motion of `time` seconds at their
+    /// velocities.
     fn joint_error(&self, states: &[State], time: f64) -> f64 {
         let of_joint = |joint: &Joint| {
             let (distance, angle) = joint.error(System::poses_of(joint, states));

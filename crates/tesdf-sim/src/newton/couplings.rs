@@ -1,8 +1,8 @@
 //! Converts couplings of joints to rows of the convex problem.
 //!
 //! A coupling is a row like those of joints (`joints.rs`), with the bodies of both joints. It has
-//! nothing to do with the velocity of one body relative to another one, so it has a group of its own
-//! (`group.rs`).
+//! nothing to do with the velocity of one body relative to another one, so it has a group of its
+//! own (`group.rs`).
 use glam::DVec3;
 use nalgebra::Vector6;
 use tesdf::collide::Pose;
@@ -41,8 +41,8 @@ pub fn predict_couplings(
     }
 }
 
-/// How far each coupling is from holding at `states`, rad or m, after a motion of `time` seconds from
-/// the states of the system with the velocities of `states`.
+/// How far each coupling is from holding at `states`, rad or m, after a motion of `time` seconds
+/// from the states of the system with the velocities of `states`.
 pub fn coupling_errors(system: &System, states: &[State], time: f64) -> impl Iterator<Item = f64> {
     let coordinate = move |k: usize| {
         let joint = &system.joints()[k];
@@ -109,8 +109,8 @@ fn row(coupling: &Coupling, error: f64, bodies: &Bodies<'_>, h: f64) -> Row {
     }
 }
 
-/// The derivative of the coordinate of a joint by the velocity of its child with this centre of mass;
-/// by that of its parent, it is the opposite.
+/// The derivative of the coordinate of a joint by the velocity of its child with this centre of
+/// mass; by that of its parent, it is the opposite.
 fn derivative(joint: &Joint, system: &System, center: DVec3) -> Vector6<f64> {
     let [parent, child]: [Pose; 2] = joint.frames_in_world(System::poses_of(joint, system.states()));
     let [_, _, z] = axes(parent);

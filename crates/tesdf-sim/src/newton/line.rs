@@ -108,8 +108,8 @@ type Sides = [[Lanes; 6]; 2];
 
 /// The inverse masses of a group.
 struct Masses {
-    /// Of the body whose velocity counts, and of the other one. A coupling has the inverse mass of its
-    /// rate as the first one.
+    /// Of the body whose velocity counts, and of the other one. A coupling has the inverse mass of
+    /// its rate as the first one.
     inverse: [Option<Inverse>; 2],
     time_step: f64,
 }

@@ -145,8 +145,9 @@ impl Newton {
 
     /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows
     /// ask for, m/s or rad/s, also through the ratios of couplings. Then rigid contacts contradict
-    /// each other: a box between a plane and a press that were 0.16 mm too near for it left sideways
-    /// at 2 km/s, because its two sides were touched along directions that differed by 70 µrad.
+    /// each other: a box between a plane and a press that were 0.16 mm too near for it left
+    /// sideways at 2 km/s, because its two sides were touched along directions that differed by 70
+    /// µrad.
     fn is_wild(
         &self,
         step: &Step,

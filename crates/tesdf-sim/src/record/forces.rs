@@ -19,8 +19,8 @@ pub(super) struct ForceRows {
     pub points: Vec<[f64; 3]>,
     /// The force along the normal, then that of friction, N, world frame.
     pub contacts: Vec<[f32; 6]>,
-    /// Force on the child, N, its torque, N m, world frame, what the motor and what couplings do; for
-    /// each joint of each step.
+    /// Force on the child, N, its torque, N m, world frame, what the motor and what couplings do;
+    /// for each joint of each step.
     pub joints: Vec<[f32; 8]>,
 }
 

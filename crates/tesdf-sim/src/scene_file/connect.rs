@@ -8,8 +8,8 @@ use crate::script::{Scripts, joint_named};
 use crate::{Coupling, Joint, System};
 
 impl LoadedScene {
-    /// Adds the friction of pairs, the excluded pairs, the joints and their couplings to the system,
-    /// and checks the scripts.
+    /// Adds the friction of pairs, the excluded pairs, the joints and their couplings to the
+    /// system, and checks the scripts.
     pub(super) fn connect(&self, system: &mut System) -> Result<(), SceneError> {
         for (k, pair) in self.scene.friction.iter().enumerate() {
             let at = |reason: String| self.value("friction", format!("number {}: {reason}", k + 1));

@@ -94,8 +94,8 @@ fn a_torque_feels_the_inertia_through_the_ratio() {
     }
 }
 
-/// A motor that lifts a bar through a gear of −2 feels twice its torque, and does the work that the bar
-/// gains.
+/// A motor that lifts a bar through a gear of −2 feels twice its torque, and does the work that the
+/// bar gains.
 #[test]
 fn a_motor_lifts_through_a_gear() {
     let motor = "anchor = [0, 0, 0]\nmotor = { drive = { velocity = -0.5 }, limit = 10 }";
@@ -167,8 +167,8 @@ fn a_weight_falls_by_the_inertia_of_its_wheel() {
     }
 }
 
-/// A gripper on an arm that swings: fingers on sliders that mirror each other, the palm on a hinge of
-/// the arm, which falls. A motor moves one finger, a force pulls at the other.
+/// A gripper on an arm that swings: fingers on sliders that mirror each other, the palm on a hinge
+/// of the arm, which falls. A motor moves one finger, a force pulls at the other.
 fn gripper(more: &str) -> String {
     let slider = |name: &str, more: &str| {
         joint(name, "slider", name, &format!("parent = \"palm\"\naxis = [0, 1, 0]\n{more}"))
@@ -212,7 +212,8 @@ fn mimic_fingers_mirror_each_other_while_the_arm_swings() {
     }
 }
 
-/// Kinetic energy and momentum of an arm that swings with coupled fingers stay: couplings do no work.
+/// Kinetic energy and momentum of an arm that swings with coupled fingers stay: couplings do no
+/// work.
 #[test]
 fn couplings_keep_energy() {
     let mut engine = engine(&gripper("").replace("motor = {", "# motor = {"));
@@ -332,7 +333,8 @@ fn snapshots_and_resets_keep_couplings() {
     assert_eq!(states(&mut engine), after_two_turns);
     engine.reset(start).unwrap();
     assert_eq!(states(&mut engine), first);
-    // A reset forgets turns: two turns of the one are five of the other, and one is no whole number.
+    // A reset forgets turns: two turns of the one are five of the other, and one is no whole
+    // number.
     engine.reset(after_two_turns).unwrap();
     let [one, two] = engine.system().coordinates() else { panic!() };
     assert!((0.0..4.0).contains(one) && (two + 2.5 * one).abs() < EXACT, "{one} {two}");
