@@ -11,6 +11,7 @@ use super::normals::normals;
 use super::rows::{Bodies, Center, Row};
 use super::runs::sort_runs;
 use super::step::Step;
+use crate::joint::{relative, rotation_between};
 use crate::{Mass, State, System};
 
 /// Directions at the beginning and the end of a step are averaged when the cosine of their angle is
@@ -264,11 +265,15 @@ impl<'a> Gaps<'a> {
         let (found, mut rows, mut far) = self.find(contacts, poses, reach, 0.0);
         far.extrapolate(velocities, self.step.h);
         for (found, row) in found.iter().zip(&mut rows) {
-            let point = self.point_of_a(found.contact, poses);
-            if let Some(before) = point.and_then(|point| before.of(found, point)) {
+            if let Some(point) = self.point_of_a(found.contact, poses)
+                && let Some(before) = before.of(found, point)
+            {
                 // Where a body slides along a face, the contact before may be that of another corner.
                 let turns = before.found.normal.distance(found.normal) > SAME_NORMAL;
-                if turns && !row.sides.iter().flatten().any(|(k, _)| is_hit[*k]) {
+                if turns
+                    && before.point.distance(point) <= self.travel(found.contact, point, poses)
+                    && !row.sides.iter().flatten().any(|(k, _)| is_hit[*k])
+                {
                     row.average(before.row);
                 }
             }
@@ -319,6 +324,17 @@ impl<'a> Gaps<'a> {
     /// The point of *a* of a contact that was found at `poses`, in the frame of *a*.
     fn point_of_a(&self, contact: &Contact, poses: &[Pose]) -> Option<DVec3> {
         Some(poses[self.system.body_of(contact.instance_a)?].to_body(contact.point_a))
+    }
+
+    /// How far the contact at `point`, in the frame of *a*, can have come along *a* since the
+    /// beginning of the step, m: as *b* slides there and rolls about radii up to the smaller body's
+    /// size. A contact farther away is that of another corner.
+    fn travel(&self, contact: &Contact, point: DVec3, poses: &[Pose]) -> f64 {
+        let bodies = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
+        let [Some(a), Some(b)] = bodies else { return 0.0 };
+        let [from, to] = [&self.step.poses[..], poses].map(|poses| relative(poses[a], poses[b]));
+        let slide = from.to_world(to.to_body(point)).distance(point);
+        slide + rotation_between(from, to).length() * self.sizes[a].min(self.sizes[b])
     }
 
     fn depths(&self, contacts: &[Contact]) -> Depths {
