@@ -1,5 +1,6 @@
 //! The tests of `tesdf-sim` over several of its modules, in one program.
 mod analytic;
+mod bin_picking;
 mod chain;
 mod couplings;
 mod deep;
