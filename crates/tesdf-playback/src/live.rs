@@ -23,6 +23,9 @@ const HEAD: u64 = 16_384;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Most connections at a time.
 const MOST: usize = 32;
+/// Most text of frames that is kept for pages that are opened later, bytes: some minutes of every
+/// frame, for a hundred bodies.
+const KEPT: usize = 64 << 20;
 
 /// A state of a run that a [`LiveView`] shows.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +48,10 @@ impl<'a> From<&Moment<'a>> for LiveFrame<'a> {
 
 /// A page on this machine that follows a run while it is made. It is served on the loopback
 /// interface alone, until this value is dropped; pages that are open then keep what they have.
+///
+/// A page that is opened later gets the states since the beginning. At most 64 MiB of them are kept:
+/// where there would be more, every other one is dropped, so old states are farther apart in time
+/// than new ones.
 #[derive(Debug)]
 pub struct LiveView {
     address: SocketAddr,
@@ -70,9 +77,41 @@ struct Shared {
 /// What pages are sent.
 #[derive(Debug, Default)]
 struct Sent {
-    frames: Vec<String>,
+    frames: Vec<SentFrame>,
+    /// Number of frames so far, with those that were dropped.
+    count: usize,
+    /// Of the text of `frames`.
+    bytes: usize,
     has_ended: bool,
     is_closed: bool,
+}
+
+/// A frame as pages are sent it.
+#[derive(Clone, Debug)]
+struct SentFrame {
+    number: usize,
+    text: Arc<str>,
+}
+
+impl Sent {
+    /// Adds a frame. Where all are more than `most` bytes then, every other one is dropped, but for
+    /// the first and the last one.
+    fn push(&mut self, text: &str, most: usize) {
+        self.bytes += text.len();
+        self.frames.push(SentFrame { number: self.count, text: text.into() });
+        self.count += 1;
+        if self.bytes > most {
+            let last = self.frames.len() - 1;
+            let mut k = 0..;
+            self.frames.retain(|_| k.next().is_some_and(|k| k == last || k % 2 == 0));
+            self.bytes = self.frames.iter().map(|frame| frame.text.len()).sum();
+        }
+    }
+
+    /// The frames from number `next` on.
+    fn from(&self, next: usize) -> &[SentFrame] {
+        &self.frames[self.frames.partition_point(|frame| frame.number < next)..]
+    }
 }
 
 impl LiveView {
@@ -136,7 +175,7 @@ impl LiveView {
             })
         });
         let frame = json!({ "time": time, "step": step, "poses": poses, "forces": forces }).to_string();
-        self.shared.sent().frames.push(frame);
+        self.shared.sent().push(&frame, KEPT);
         self.shared.grown.notify_all();
         Ok(())
     }
@@ -170,12 +209,11 @@ impl Shared {
 
     /// The frames from number `next` on, once there are any or after some seconds, and whether
     /// there will be more.
-    fn wait(&self, next: usize) -> (Vec<String>, bool) {
-        let waits = |sent: &mut Sent| sent.frames.len() <= next && !sent.has_ended && !sent.is_closed;
+    fn wait(&self, next: usize) -> (Vec<SentFrame>, bool) {
+        let waits = |sent: &mut Sent| sent.count <= next && !sent.has_ended && !sent.is_closed;
         let waited = self.grown.wait_timeout_while(self.sent(), PATIENCE, waits);
         let (sent, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        let frames = sent.frames.get(next..).unwrap_or_default().to_vec();
-        (frames, !sent.has_ended && !sent.is_closed)
+        (sent.from(next).to_vec(), !sent.has_ended && !sent.is_closed)
     }
 }
 
@@ -244,9 +282,9 @@ fn stream_frames(mut stream: &TcpStream, shared: &Shared, mut next: usize) -> st
     loop {
         let (frames, goes_on) = shared.wait(next);
         let mut text = String::new();
-        for frame in &frames {
-            text += &format!("id: {next}\ndata: {frame}\n\n");
-            next += 1;
+        for SentFrame { number, text: frame } in &frames {
+            text += &format!("id: {number}\ndata: {frame}\n\n");
+            next = number + 1;
         }
         match goes_on {
             // A comment finds out whether the browser is still there.
@@ -258,5 +296,29 @@ fn stream_frames(mut stream: &TcpStream, shared: &Shared, mut next: usize) -> st
         if !goes_on {
             return Ok(());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Sent;
+
+    /// What is kept stays bounded, spans the run, and is denser the newer it is.
+    #[test]
+    fn old_frames_are_thinned() {
+        let mut sent = Sent::default();
+        for number in 0..10_000 {
+            sent.push(&format!("{number:010}"), 1_000);
+            assert!(sent.bytes <= 1_000 && sent.bytes == 10 * sent.frames.len());
+            assert_eq!(sent.frames.last().unwrap().number, number);
+            // A page that has all frames so far gets the next one.
+            assert_eq!(sent.from(number).len(), 1);
+        }
+        let numbers: Vec<usize> = sent.frames.iter().map(|frame| frame.number).collect();
+        assert!(sent.frames.iter().all(|frame| *frame.text == *format!("{:010}", frame.number)));
+        assert!(numbers[0] == 0 && numbers.len() >= 50);
+        let apart: Vec<usize> = numbers.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(apart.windows(2).all(|pair| pair[0] >= pair[1]), "{apart:?}");
+        assert_eq!(sent.from(5_000).len(), numbers.iter().filter(|n| **n >= 5_000).count());
     }
 }
