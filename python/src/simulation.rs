@@ -623,6 +623,10 @@ impl Simulation {
         contacts::of_step(py, &found, &hidden)
     }
 
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("tesdf.playback")?.getattr("_of_notebook")?.call1((slf,))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> String {
         let (bodies, steps, planned) =
             self.read(py, |r| (r.states().len(), r.world.steps(), r.scene.planned));

@@ -775,6 +775,7 @@ class Simulation:
     def copy(self) -> Simulation:
         """A simulation that goes on from the same moment on its own. It shares the meshes."""
     def __copy__(self) -> Simulation: ...
+    def _repr_html_(self) -> str: ...
     @property
     def masses(self) -> npt.NDArray[np.float64]:
         """Masses [B], kg; inf of bodies that are not free."""

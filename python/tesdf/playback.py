@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import tempfile
 import webbrowser
 from collections.abc import Mapping
@@ -11,8 +12,14 @@ from pathlib import Path
 from typing import Union
 
 from . import _native
+from .errors import SimulationError
 
 _Path = Union[str, "PathLike[str]"]
+
+# Notebooks keep what they show, so a page in one has fewer states than a file, no contacts, and at
+# most this many bytes.
+_NOTEBOOK_FRAMES = 300
+_NOTEBOOK_BYTES = 8_000_000
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,28 @@ class LiveView:
 
     def _repr_html_(self) -> str:
         return f'<iframe src="{self.url}" width="100%" height="520" style="border: 0"></iframe>'
+
+
+def _of_notebook(simulation: _native.Simulation) -> str:
+    """What a notebook shows of a simulation: the page of `view`, or where it would be too large or there
+    are no states, what to call instead."""
+    said = html.escape(repr(simulation))
+    every = max(1, -(-simulation.steps // _NOTEBOOK_FRAMES))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "page.html")
+        try:
+            _native.view(simulation, path, every=every, contacts=0, title="simulation")
+        except SimulationError as error:
+            return f"<p>{said}</p><p>{html.escape(str(error))}; <code>view()</code> shows the steps to come</p>"
+        size = path.stat().st_size
+        page = path.read_text(encoding="utf-8") if size <= _NOTEBOOK_BYTES else None
+    if page is None:
+        return f'<p>{said}</p><p>{size / 1e6:.0f} MB to play: <code>tesdf.view(simulation, "page.html")</code></p>'
+    # Scripts of the page see nothing of the notebook.
+    return (
+        f'<iframe srcdoc="{html.escape(page)}" sandbox="allow-scripts" width="100%" height="520" '
+        'style="border: 0"></iframe>'
+    )
 
 
 def export(

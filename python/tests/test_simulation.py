@@ -1,7 +1,9 @@
 """Simulations of scene files against the command `tesdf simulate`."""
 
+import html
 import json
 import os
+import re
 import subprocess
 import urllib.request
 
@@ -316,6 +318,19 @@ def test_an_exception_of_progress_ends_a_run(scene):
 def test_ctrl_c_ends_a_run(scene):
     body = ["simulation = tesdf.Simulation(sys.argv[1], duration=1000)", "print('started', flush=True)", "simulation.run()"]
     ended_by_ctrl_c(body, scene)
+
+
+def test_a_notebook_plays_a_run_or_says_what_to_call(scene, tmp_path, monkeypatch):
+    simulation = tesdf.Simulation(scene)
+    simulation.run()
+    shown = simulation._repr_html_()
+    source = re.fullmatch(r'<iframe srcdoc="([^"]*)" sandbox="allow-scripts" [^<>]*></iframe>', shown).group(1)
+    every = -(-simulation.steps // 300)
+    tesdf.view(simulation, tmp_path / "page.html", every=every, contacts=0, title="simulation")
+    assert html.unescape(source) == (tmp_path / "page.html").read_text(encoding="utf-8")
+    monkeypatch.setattr(tesdf.playback, "_NOTEBOOK_BYTES", 1000)
+    assert "tesdf.view(simulation" in simulation._repr_html_() and len(simulation._repr_html_()) < 300
+    assert "<code>view()</code>" in tesdf.Simulation(scene, history=False)._repr_html_()
 
 
 def test_a_page_follows_the_steps(scene):
