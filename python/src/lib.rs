@@ -58,8 +58,6 @@ mod _native {
     #[pymodule_export]
     use super::polygons::polygons;
     #[pymodule_export]
-    use super::poses::pose;
-    #[pymodule_export]
     use super::scene::Scene;
     #[pymodule_export]
     use super::scene::pair;

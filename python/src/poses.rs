@@ -2,7 +2,7 @@
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use tesdf::collide::{CollideError, Motion, Pose, Velocity};
-use tesdf::glam::{DMat3, DQuat, DVec3};
+use tesdf::glam::{DQuat, DVec3};
 
 use crate::arrays;
 use crate::errors::{Error, argument};
@@ -16,10 +16,6 @@ pub enum Count {
     Rows,
 }
 
-/// A matrix whose rotation deviates from an orthonormal one by at most this is accepted. The
-/// deviation counts as rounding; it is that of the library for the length of a quaternion.
-const UNIT: f64 = 1e-6;
-
 /// Converts poses: translation and unit quaternion, x y z qx qy qz qw, or matrices of 4 × 4.
 ///
 /// # Errors
@@ -29,7 +25,7 @@ pub fn poses(name: &str, any: &Bound<'_, PyAny>, count: Count) -> PyResult<Vec<P
     let numbers = array.as_slice()?;
     let found: Vec<Result<Pose, CollideError>> = match (count, array.shape()) {
         (Count::One, [7]) | (Count::Rows, [_, 7]) => rows(numbers).map(of_quaternion).collect(),
-        (Count::One, [4, 4]) | (Count::Rows, [_, 4, 4]) => rows(numbers).map(of_matrix).collect(),
+        (Count::One, [4, 4]) | (Count::Rows, [_, 4, 4]) => rows(numbers).map(Pose::from_matrix).collect(),
         _ => {
             let expected = match count {
                 Count::One => "shape (7,), x y z qx qy qz qw, or (4, 4)",
@@ -43,12 +39,6 @@ pub fn poses(name: &str, any: &Bound<'_, PyAny>, count: Count) -> PyResult<Vec<P
         pose.map_err(|e| Error::CollideAt(at, e).raise(any.py()))
     };
     found.into_iter().enumerate().map(named).collect()
-}
-
-/// The seven numbers of a pose, x y z qx qy qz qw, of these or of a matrix [4, 4]. Errors name it.
-#[pyfunction]
-pub fn pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<[f64; 7]> {
-    Ok(of_pose(&poses(name, pose, Count::One)?[0]))
 }
 
 /// Converts velocities: linear, then angular in radians, vx vy vz wx wy wz. The scene checks that
@@ -237,31 +227,4 @@ pub fn of_twist(&[x, y, z, i, j, k]: &[f64; 6]) -> Velocity {
 fn of_screw(&[px, py, pz, ax, ay, az, angular_speed, pitch]: &[f64; 8]) -> Motion {
     let [point, axis] = [[px, py, pz], [ax, ay, az]].map(DVec3::from_array);
     Motion::Screw { point, axis, angular_speed, pitch }
-}
-
-/// A matrix that maps columns: the rotation is its upper left part, the translation its last
-/// column.
-fn of_matrix(m: &[f64; 16]) -> Result<Pose, CollideError> {
-    let refuse = |found: String, expected| Err(CollideError::NotAPose { found, expected });
-    if !m.iter().all(|x| x.is_finite()) {
-        return refuse(format!("matrix {m:?}"), "finite numbers");
-    }
-    let [column_x, column_y, column_z, translation] =
-        [0, 1, 2, 3].map(|c| DVec3::new(m[c], m[4 + c], m[8 + c]));
-    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-        return refuse(
-            format!("last row {:?}", &m[12..]),
-            "[0, 0, 0, 1]: the translation is the last column",
-        );
-    }
-    let rotation = DMat3::from_cols(column_x, column_y, column_z);
-    let deviation = rotation.transpose() * rotation - DMat3::IDENTITY;
-    let deviation = deviation.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
-    if deviation > UNIT || rotation.determinant() < 0.0 {
-        return refuse(
-            format!("a matrix that deforms or mirrors: columns {column_x}, {column_y}, {column_z}"),
-            "three unit vectors, at right angles up to 1e-6 and right-handed; `scale` is an argument of its own",
-        );
-    }
-    Pose::new(translation, DQuat::from_mat3(&rotation).normalize())
 }

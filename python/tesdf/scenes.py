@@ -16,8 +16,7 @@ _GEOMETRY = ("asset", "mesh", "shape")
 def to_json(scene: Mapping[str, Any]) -> tuple[str, dict[str, _native.Asset]]:
     """The text of a scene with the keys of a scene file, and the assets that its bodies name.
 
-    Arrays of numpy become lists, paths text, objects of shapes their keys, and poses translations and
-    rotations.
+    Arrays of numpy become lists, paths text, and objects of shapes their keys.
     """
     memory = _Memory()
     bodies = scene.get("bodies")
@@ -63,29 +62,12 @@ def _body(k: int, body: Any, memory: _Memory) -> Any:
                 keywords["repair"] = "auto"
             choices = json.dumps(keywords, sort_keys=True, default=_plain)
             body["asset"] = memory.name((id(value), choices), value, lambda: _native.encode(value, "fast", **keywords))
-    _place(where, body)
-    copies = body.get("copies")
-    if isinstance(copies, Mapping):
-        body["copies"] = dict(copies)
-        _place(f"{where}: copies", body["copies"])
     velocity = body.get("velocity")
     if velocity is not None and not isinstance(velocity, str) and len(velocity) == 6:
         if "angular_velocity" in body:
             raise ValueError(f"{where}: velocity: six numbers beside angular_velocity; expected three, or no angular_velocity")
         body["velocity"], body["angular_velocity"] = list(velocity[:3]), list(velocity[3:])
     return body
-
-
-def _place(where: str, keys: dict[str, Any]) -> None:
-    """Puts a translation and a rotation in place of a pose."""
-    pose = keys.pop("pose", None)
-    if pose is None:
-        return
-    both = [key for key in ("translation", "rotation") if key in keys]
-    if both:
-        raise ValueError(f"{where}: pose beside {both[0]}; expected one of them")
-    numbers = _native.pose(f"{where}: pose", pose)
-    keys["translation"], keys["rotation"] = numbers[:3], numbers[3:]
 
 
 def _shape(shape: Plane | Box | Sphere | Capsule) -> Any:

@@ -4,7 +4,7 @@ use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 use toml::Spanned;
 
-use super::{BodySection, MAX_BODIES, identity};
+use super::{BodySection, MAX_BODIES, PoseSection, identity};
 
 /// Copies of a body, each placed by the one before. The names of the bodies are the name and a
 /// number from 0 on: `link0`, `link1`, …
@@ -19,6 +19,10 @@ pub struct CopiesSection {
     /// The next copy's orientation in the frame of the one before: a unit quaternion x y z w.
     #[serde(default = "identity")]
     pub rotation: [f64; 4],
+    /// Both together: x y z qx qy qz qw, or the rows of a matrix of 4 × 4. A loaded scene has them
+    /// apart.
+    #[serde(default, skip_serializing)]
+    pub pose: Option<PoseSection>,
 }
 
 /// A body whose copies are not valid, and what is wrong with them.
@@ -44,7 +48,7 @@ pub(super) fn expand(bodies: Vec<Spanned<BodySection>>) -> Result<Vec<Spanned<Bo
 
 /// The copies of a body that comes after `before` others; `None` if it has no copies.
 fn copies(body: &BodySection, before: usize) -> Result<Option<Vec<BodySection>>, String> {
-    let Some(CopiesSection { count, translation, rotation }) = body.copies else { return Ok(None) };
+    let Some(CopiesSection { count, translation, rotation, .. }) = body.copies else { return Ok(None) };
     if count == 0 || count > MAX_BODIES - before.min(MAX_BODIES) {
         return Err(format!("copies.count is {count}; expected 1 to {MAX_BODIES} bodies in the scene"));
     }

@@ -68,6 +68,7 @@ mod copies;
 mod error;
 mod limits;
 mod parts;
+mod place;
 mod read;
 mod robots;
 mod units;
@@ -85,6 +86,7 @@ pub use copies::CopiesSection;
 pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use parts::{PartSection, PartShape};
+pub use place::PoseSection;
 pub use read::LoadedScene;
 pub use robots::{RobotMotor, RobotSection};
 
@@ -285,6 +287,10 @@ pub struct BodySection {
     /// Orientation: a unit quaternion x y z w.
     #[serde(default = "identity")]
     pub rotation: [f64; 4],
+    /// Both together: x y z qx qy qz qw, or the rows of a matrix of 4 × 4. A loaded scene has them
+    /// apart.
+    #[serde(default, skip_serializing)]
+    pub pose: Option<PoseSection>,
     /// Velocity of the body's origin, m/s.
     #[serde(default)]
     pub velocity: [f64; 3],
@@ -348,6 +354,7 @@ impl BodySection {
             scale: one(),
             translation: [0.0; 3],
             rotation: identity(),
+            pose: None,
             velocity: [0.0; 3],
             angular_velocity: [0.0; 3],
             density: None,

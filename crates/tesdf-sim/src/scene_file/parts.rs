@@ -8,7 +8,7 @@ use tesdf::collide::Pose;
 use tesdf::glam::{DAffine3, DQuat, DVec3};
 use tesdf::mesh::{RepairMode, SolidMesh, TriangleMesh};
 
-use super::identity;
+use super::{PoseSection, identity};
 
 /// Faces around the axis of a round part.
 const AROUND: usize = 64;
@@ -32,6 +32,10 @@ pub struct PartSection {
     /// Orientation in the frame of the body: a unit quaternion x y z w.
     #[serde(default = "identity")]
     pub rotation: [f64; 4],
+    /// Both together: x y z qx qy qz qw, or the rows of a matrix of 4 × 4. A loaded scene has them
+    /// apart.
+    #[serde(default, skip_serializing)]
+    pub pose: Option<PoseSection>,
 }
 
 /// A simple shape that is a mesh within a body. Round ones have 64 faces around their axis, whose

@@ -10,6 +10,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::asset_cache::AssetCache;
 use super::copies::expand;
+use super::place;
 use super::robots::{self, Expanded};
 use super::{BodySection, MAX_BODIES, RobotSection, SceneError, SceneFile};
 use crate::RunRecord;
@@ -95,12 +96,18 @@ impl LoadedScene {
             })?;
             scene.criterion.insert(reader.name, (reader.toml)(table.into()).map_err(refuse)?);
         }
+        if text.contains("pose") {
+            // Values are enough to find what is given twice.
+            let values: Value = toml::from_str(&text).map_err(refuse)?;
+            place::check(&values).map_err(|message| SceneError::Parse { path: path.clone(), message })?;
+        }
         Self { scene, path, assets: None, memory: BTreeMap::new(), text }.with_copies()
     }
 
     /// The scene with each copy of a body as a body of its own, and with the bodies and joints of
     /// its robots.
     fn with_copies(mut self) -> Result<Self, SceneError> {
+        place::place_all(&mut self.scene);
         match expand(std::mem::take(&mut self.scene.bodies)) {
             Ok(bodies) => self.scene.bodies = bodies,
             Err((body, reason)) => return Err(self.error_at(&body, reason)),
@@ -194,6 +201,7 @@ impl LoadedScene {
     /// Without `criteria`, those of the scene are left out.
     fn parse_json(mut json: Value, path: PathBuf, criteria: Option<&Criteria>) -> Result<Self, SceneError> {
         let refuse = |message: String| SceneError::Parse { path: path.clone(), message };
+        place::check(&json).map_err(refuse)?;
         let tables = match json.get_mut("criterion") {
             Some(Value::Object(tables)) => std::mem::take(tables),
             _ => serde_json::Map::new(),

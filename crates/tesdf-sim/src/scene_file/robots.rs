@@ -7,7 +7,7 @@ use tesdf::collide::Pose;
 use tesdf::glam::{DMat3, DQuat, DVec3};
 
 use super::parts::{PartSection, PartShape};
-use super::{BodySection, CouplingSection, ExcludeSection, JointSection, identity};
+use super::{BodySection, CouplingSection, ExcludeSection, JointSection, PoseSection, identity};
 use crate::joint::{relative, wrapped};
 use crate::robot::{Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint, composed};
 use crate::{Drive, JointKind, JointResistance, MassProperties, Motor};
@@ -33,6 +33,10 @@ pub struct RobotSection {
     /// Orientation: a unit quaternion x y z w.
     #[serde(default = "identity")]
     pub rotation: [f64; 4],
+    /// Both together: x y z qx qy qz qw, or the rows of a matrix of 4 × 4. A loaded scene has them
+    /// apart.
+    #[serde(default, skip_serializing)]
+    pub pose: Option<PoseSection>,
     /// Coordinates of joints at the start, rad or m, by the joint's name in the file; others are 0,
     /// or the nearest number within their limits, or follow from that of a joint that they follow.
     #[serde(default)]
@@ -528,5 +532,6 @@ fn part(collision: &Collision, frame: Pose) -> PartSection {
         scale: scale.to_array(),
         translation: pose.translation.to_array(),
         rotation: pose.rotation.to_array(),
+        pose: None,
     }
 }

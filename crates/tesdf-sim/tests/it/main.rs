@@ -14,6 +14,7 @@ mod lift;
 mod mass_by_rule;
 mod newton;
 mod passing;
+mod poses;
 mod recorded_warnings;
 mod rest;
 mod restitution;

@@ -1,4 +1,4 @@
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 use crate::collide::scene::error::CollideError;
 use crate::geometry::Aabb;
@@ -41,6 +41,36 @@ impl Pose {
         // A quaternion of exactly unit length is kept bit for bit.
         let rotation = if length == 1.0 { rotation } else { rotation / length };
         Ok(Self { translation, rotation })
+    }
+
+    /// The pose of a matrix of 4 × 4, given row by row. Its rotation may deviate from an orthonormal
+    /// one by 1e-6, which counts as rounding.
+    ///
+    /// # Errors
+    /// [`CollideError::NotAPose`] for other matrices.
+    pub fn from_matrix(m: &[f64; 16]) -> Result<Self, CollideError> {
+        let refuse = |found: String, expected| Err(CollideError::NotAPose { found, expected });
+        if !m.iter().all(|x| x.is_finite()) {
+            return refuse(format!("matrix {m:?}"), "finite numbers");
+        }
+        let [column_x, column_y, column_z, translation] =
+            [0, 1, 2, 3].map(|c| DVec3::new(m[c], m[4 + c], m[8 + c]));
+        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+            return refuse(
+                format!("last row {:?}", &m[12..]),
+                "[0, 0, 0, 1]: the translation is the last column",
+            );
+        }
+        let rotation = DMat3::from_cols(column_x, column_y, column_z);
+        let deviation = rotation.transpose() * rotation - DMat3::IDENTITY;
+        let deviation = deviation.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+        if deviation > UNIT || rotation.determinant() < 0.0 {
+            return refuse(
+                format!("a matrix that deforms or mirrors: columns {column_x}, {column_y}, {column_z}"),
+                "three unit vectors, at right angles up to 1e-6 and right-handed; `scale` is an argument of its own",
+            );
+        }
+        Self::new(translation, DQuat::from_mat3(&rotation).normalize())
     }
 
     /// A pose without rotation.
