@@ -57,11 +57,11 @@ impl Files<'_> {
             let depth = above.copied().unwrap_or(0) + usize::from(node.is_element());
             depths.push(depth);
             let other = match node.tag_name().name() {
-                "include" => self.included(path, is_model, node, line(node))?,
+                "include" => self.included(path, is_model, node, &line)?,
                 "model" => {
                     // Its file is relative to that of the model that attaches it.
                     let file = node.attribute("file").map(|name| path.with_file_name(name));
-                    let model = file.map(|file| self.other(path, &file, true, line(node)));
+                    let model = file.map(|file| self.other(path, &file, true, &|| line(node)));
                     let model = model.transpose()?.unwrap_or_default();
                     models.extend(node.attribute("name").map(|name| (name, model)));
                     model
@@ -95,17 +95,24 @@ impl Files<'_> {
         path: &Path,
         is_model: bool,
         node: Node<'_, '_>,
-        line: u32,
+        line: &dyn Fn(Node<'_, '_>) -> u32,
     ) -> Result<Size, RobotError> {
         let Some(name) = node.attribute("file") else {
-            return Err(RobotError::in_line(path, line, "<include> has no file; expected one"));
+            return Err(RobotError::in_line(path, line(node), "<include> has no file; expected one"));
         };
         let folder = if is_model { path.parent().unwrap_or(Path::new("")) } else { self.folder };
-        self.other(path, &folder.join(name), is_model, line)
+        self.other(path, &folder.join(name), is_model, &|| line(node))
     }
 
-    fn other(&mut self, path: &Path, file: &Path, is_model: bool, line: u32) -> Result<Size, RobotError> {
-        let at = |found: String| RobotError::in_line(path, line, found);
+    /// `line` counts from the start of the file, so it is called for an error alone.
+    fn other(
+        &mut self,
+        path: &Path,
+        file: &Path,
+        is_model: bool,
+        line: &dyn Fn() -> u32,
+    ) -> Result<Size, RobotError> {
+        let at = |found: String| RobotError::in_line(path, line(), found);
         if let Err(e) = std::fs::metadata(file) {
             return Err(at(format!("cannot read {}: {e}", file.display())));
         }
@@ -139,6 +146,8 @@ mod tests {
     #[test]
     fn bodies_nested_too_deep_are_refused_and_others_fit_the_stack() {
         let told = refusal(&[("robot.xml", chain(3000))]);
+        assert!(told.contains("line 1: 257 elements within each other"), "{told}");
+        let told = refusal(&[("robot.xml", chain(200))]);
         assert!(told.contains("line 1: elements are nested 65 deep; expected at most 64"), "{told}");
         let half = |name: &str| {
             let deep = "<body>".repeat(32);

@@ -11,8 +11,11 @@ mod mjcf;
 mod packages;
 mod solids;
 mod urdf;
+mod xml;
 
 use std::path::{Path, PathBuf};
+
+use tesdf::input;
 
 pub use description::{
     Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint, Unread, composed,
@@ -20,6 +23,7 @@ pub use description::{
 pub use include::expand;
 pub use packages::Packages;
 pub use urdf::mesh_reference;
+pub use xml::parse;
 
 /// Formats of robot descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,20 +102,11 @@ impl Robot {
     }
 }
 
-/// The text of a file.
+/// The text of a file. It is a regular one, because it is read twice.
 ///
 /// # Errors
 /// It cannot be read.
 pub fn read(path: &Path) -> Result<String, RobotError> {
-    tesdf::input::read_to_string(path).map_err(|e| RobotError(format!("cannot read {}: {e}", path.display())))
-}
-
-/// The XML of the file at `path`.
-///
-/// # Errors
-/// It is none.
-pub fn parse<'a>(path: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, RobotError> {
-    let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
-    roxmltree::Document::parse_with_options(text, options)
-        .map_err(|e| RobotError::in_file(path, format!("the XML is broken: {e}")))
+    let text = input::check_regular(path).and_then(|()| input::read_to_string(path));
+    text.map_err(|e| RobotError(format!("cannot read {}: {e}", path.display())))
 }

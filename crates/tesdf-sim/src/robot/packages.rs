@@ -1,7 +1,8 @@
 //! Finds the files that a URDF file names.
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
+
+use super::{parse, read};
 
 /// Where the packages of a URDF file may be.
 pub struct Packages<'a> {
@@ -71,8 +72,9 @@ fn is_package(folder: &Path, name: &str) -> bool {
     if folder.file_name().is_some_and(|own| own == name) {
         return true;
     }
-    let Ok(text) = fs::read_to_string(folder.join("package.xml")) else { return false };
-    roxmltree::Document::parse(&text).is_ok_and(|document| {
+    let file = folder.join("package.xml");
+    let Ok(text) = read(&file) else { return false };
+    parse(&file, &text).is_ok_and(|document| {
         let mut own = document.root_element().children().filter(|node| node.has_tag_name("name"));
         own.any(|node| node.text().unwrap_or_default().trim() == name)
     })

@@ -3,6 +3,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 use tesdf::collide::{Pose, Shape};
+use tesdf::input;
 
 use super::{Collision, Geometry};
 use crate::{MassError, MassProperties};
@@ -30,6 +31,7 @@ pub(super) fn of_density_one(Collision { pose, geometry }: &Collision) -> Result
             MassProperties::new(mass, DVec3::ZERO, inertia).map_err(told)?
         }
         Geometry::Mesh { file, scale } => {
+            input::check_regular(file).map_err(|e| format!("{}: {e}", file.display()))?;
             let mesh = tesdf::mesh::read(file).map_err(|e| e.in_file(file))?.mesh;
             let mirrored = scale.x * scale.y * scale.z < 0.0;
             let triangle = |face: usize| {

@@ -9,6 +9,7 @@ use tesdf::collide::{
 };
 use tesdf::encode::{EncodeChoices, EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::input;
 use tesdf::mesh::{RepairMode, SolidMesh, UnknownRepair};
 use tesdf::{Length, Progress, TeSdf};
 
@@ -224,6 +225,10 @@ impl Shapes {
                 let key = (path, format!("{inside}, {repair:?}"));
                 if let Some(&shape) = self.0.get(&key) {
                     return Ok(shape);
+                }
+                if in_memory.is_none() {
+                    let refused = |e| ShapeFailure::Reason(format!("{}: {e}", file.display()));
+                    input::check_regular(&file).map_err(refused)?;
                 }
                 let opened = match (in_memory, &body.asset) {
                     (Some(asset), _) => Arc::clone(asset),

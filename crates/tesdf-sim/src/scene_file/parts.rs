@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::base::{Inside, SurfaceFaces};
 use tesdf::collide::Pose;
 use tesdf::glam::{DAffine3, DQuat, DVec3};
+use tesdf::input;
 use tesdf::mesh::{RepairMode, SolidMesh, TriangleMesh};
 
 use super::{PoseSection, identity};
@@ -104,6 +105,7 @@ fn placed(
     let mesh = match (&part.mesh, &part.shape) {
         (Some(file), None) => {
             let file = resolve(file);
+            input::check_regular(&file).map_err(|e| format!("{}: {e}", file.display()))?;
             let loaded = tesdf::mesh::read(&file).map_err(|e| e.in_file(&file).to_string())?;
             let solid = SolidMesh::with_repair(loaded.mesh, Inside::default(), repair);
             solid.map_err(|e| format!("{}: {e}", file.display()))?.0.into_mesh()

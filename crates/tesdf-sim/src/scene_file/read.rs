@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -19,6 +20,8 @@ use crate::robot::{Geometry, Robot, RobotError, RobotFormat};
 
 /// Maximum size of a scene file: a thousand bytes per body.
 const MAX_TEXT: usize = 1000 * MAX_BODIES;
+/// Maximum number of pairs without contacts, which robots have.
+const MAX_EXCLUDED: usize = 1 << 20;
 
 /// A scene file, with the path and text that error messages and relative paths refer to.
 #[derive(Clone, Debug)]
@@ -112,16 +115,30 @@ impl LoadedScene {
             Ok(bodies) => self.scene.bodies = bodies,
             Err((body, reason)) => return Err(self.error_at(&body, reason)),
         }
+        let (spans, mut read) = (self.robot_spans(), BTreeMap::new());
         for (k, section) in std::mem::take(&mut self.scene.robots).into_iter().enumerate() {
-            let span = self.robot_span(k);
+            let span = spans.get(k).cloned().unwrap_or_default();
             let at = |reason: String| {
                 let line = (!self.text.is_empty()).then(|| self.line(span.start));
                 let key = format!("robots: {}", section.file.display());
                 SceneError::Value { path: self.path.clone(), line, key, reason }
             };
-            let robot = self.robot(&section).map_err(|e| at(e.to_string()))?;
-            let expanded = robots::expand(&section, &robot).map_err(at)?;
+            // A scene of some kilobytes can name a large file any number of times.
+            let robot = match read.entry((section.file.clone(), section.packages.clone())) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => new.insert(self.robot(&section).map_err(|e| at(e.to_string()))?),
+            };
+            let expanded = robots::expand(&section, robot).map_err(at)?;
             let Expanded { bodies, joints, couplings, exclude } = expanded;
+            for (found, most, what) in [
+                (self.scene.bodies.len() + bodies.len(), MAX_BODIES, "bodies"),
+                (self.scene.exclude.len() + exclude.len(), MAX_EXCLUDED, "pairs of bodies without contacts"),
+            ] {
+                if found > most {
+                    let found = format!("with this robot there are {found} {what}");
+                    return Err(at(format!("{found}; expected at most {most}: split the scene")));
+                }
+            }
             self.scene.bodies.extend(bodies.into_iter().map(|body| Spanned::new(span.clone(), body)));
             self.scene.joints.extend(joints);
             self.scene.couplings.extend(couplings);
@@ -149,12 +166,12 @@ impl LoadedScene {
         Ok(robot)
     }
 
-    /// Where a robot is in the text.
-    fn robot_span(&self, robot: usize) -> std::ops::Range<usize> {
+    /// Where the robots are in the text.
+    fn robot_spans(&self) -> Vec<std::ops::Range<usize>> {
         let document = DeTable::parse(&self.text).ok();
         let robots = document.as_ref().and_then(|document| document.get_ref().get("robots"));
         let robots = robots.and_then(|robots| robots.get_ref().as_array());
-        robots.and_then(|robots| robots.get(robot)).map_or(0..0, Spanned::span)
+        robots.into_iter().flatten().map(Spanned::span).collect()
     }
 
     /// The scene that is stored in a run, without its criteria, where `run` is the path of the run

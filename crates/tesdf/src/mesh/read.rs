@@ -287,8 +287,11 @@ fn files_of(path: &Path) -> Vec<PathBuf> {
 /// ```
 pub fn source_blake3(path: impl AsRef<Path>) -> Result<String, ReadError> {
     let mut hasher = blake3::Hasher::new();
-    for path in files_of(path.as_ref()) {
-        let bytes = input::read(&path).map_err(|source| ReadError::Open { path, source })?;
+    for (k, path) in files_of(path.as_ref()).into_iter().enumerate() {
+        // The file names the others.
+        let allowed = if k == 0 { Ok(()) } else { input::check_regular(&path) };
+        let bytes = allowed.and_then(|()| input::read(&path));
+        let bytes = bytes.map_err(|source| ReadError::Open { path, source })?;
         hasher.update(&bytes);
     }
     Ok(hasher.finalize().to_hex().to_string())

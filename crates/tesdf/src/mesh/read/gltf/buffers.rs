@@ -10,6 +10,7 @@ use json::accessor::{ComponentType, GenericComponentType, Type};
 use json::validation::Checked;
 
 use super::{MeshFormat, ReadError, fault};
+use crate::input;
 use crate::mesh::text::shown;
 
 /// Loads the bytes of all buffers. Bytes of external files also go into `hasher`.
@@ -57,7 +58,8 @@ pub(super) fn load<'a>(
                         "expected a file next to the glTF file, or below its folder",
                     )
                 })?;
-                let bytes = crate::input::read(folder.join(&path)).map_err(|e| {
+                let file = folder.join(&path);
+                let bytes = input::check_regular(&file).and_then(|()| input::read(&file)).map_err(|e| {
                     let name = shown(path.as_os_str().as_encoded_bytes());
                     error(format!("the file {name}: {e}"), "put the file there, or export GLB")
                 })?;
