@@ -92,7 +92,7 @@ impl TeSdf {
         Some(SignArrays {
             rule: self.inside().rule,
             triangles,
-            closing: rule.jump().map_or(Vec::new(), |jump| jump.closing().to_vec()),
+            closing: rule.jump().map_or(Vec::new(), |jump| jump.closing()),
             reach_beyond: rule.jump().map_or(0.0, GeneralizedWinding::reach_beyond),
             faces_look_outward: self.faces_look_outward(),
         })

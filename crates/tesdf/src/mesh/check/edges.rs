@@ -5,6 +5,9 @@ use glam::DVec3;
 use super::BoundaryLoop;
 use crate::mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh};
 
+/// Number of faces that the message of an edge names. Its defect has all of them.
+const NAMED: usize = 16;
+
 /// Finds open, non-manifold and inconsistently oriented edges, and non-orientable surfaces.
 pub(super) fn edge_defects(mesh: &TriangleMesh, topology: &Topology, lenient: Severity) -> Vec<Defect> {
     let mut defects = Vec::new();
@@ -12,7 +15,10 @@ pub(super) fn edge_defects(mesh: &TriangleMesh, topology: &Topology, lenient: Se
     for edge in topology.edges().iter().filter(|e| !e.is_manifold()) {
         let [a, b] = edge.vertices;
         let faces: Vec<u32> = topology.uses(edge).iter().map(|u| u.face).collect();
-        let named = faces.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+        let mut named = faces.iter().take(NAMED).map(u32::to_string).collect::<Vec<_>>().join(", ");
+        if faces.len() > NAMED {
+            named += ", …";
+        }
         let (kind, severity, message) = match edge.face_count() {
             1 => (
                 DefectKind::OpenEdge,

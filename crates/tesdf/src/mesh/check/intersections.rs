@@ -1,4 +1,4 @@
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::ops::ControlFlow;
 
 use super::edges::centroid;
@@ -30,18 +30,50 @@ pub(crate) fn self_intersections(
     without_area: &[u32],
     touching: &HashSet<(u32, u32)>,
 ) -> Vec<[u32; 2]> {
-    let faces: Vec<u32> =
-        (0..mesh.faces().len() as u32).filter(|f| without_area.binary_search(f).is_err()).collect();
+    let copies = Copies::find(mesh, without_area);
     let (mut pairs, most) = (Vec::new(), max_pairs(mesh));
     // The number of pairs shows whether the search was broken off.
-    let _ = pairs_that_may_meet(mesh, &faces, |f, g| {
-        if meet_beyond_shared(mesh, f, g) && !touching.contains(&(f, g)) && !touching.contains(&(g, f)) {
-            pairs.push([f, g]);
+    let _ = pairs_that_may_meet(mesh, &copies.first, |f, g| {
+        if meet_beyond_shared(mesh, f, g) {
+            let both = copies.of(f).flat_map(|f| copies.of(g).map(move |g| [f.min(g), f.max(g)]));
+            let apart = |&[f, g]: &[u32; 2]| !touching.contains(&(f, g)) && !touching.contains(&(g, f));
+            pairs.extend(both.filter(apart).take(most - pairs.len()));
         }
         if pairs.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
     pairs.sort_unstable();
     pairs
+}
+
+/// Faces with the same three corners, which meet the same faces. A mesh may have any number of
+/// them, and they make no pair with each other.
+struct Copies {
+    /// The first face with its three corners, ascending.
+    first: Vec<u32>,
+    /// For a first face, all later ones, ascending.
+    later: HashMap<u32, Vec<u32>>,
+}
+
+impl Copies {
+    fn find(mesh: &TriangleMesh, without_area: &[u32]) -> Self {
+        let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.faces().len());
+        let mut copies = Self { first: Vec::new(), later: HashMap::new() };
+        for (face, &(mut corners)) in (0..).zip(mesh.faces()) {
+            if without_area.binary_search(&face).is_err() {
+                corners.sort_unstable();
+                match *known.entry(corners).or_insert(face) {
+                    first if first == face => copies.first.push(face),
+                    first => copies.later.entry(first).or_default().push(face),
+                }
+            }
+        }
+        copies
+    }
+
+    fn of(&self, first: u32) -> impl Iterator<Item = u32> + Clone {
+        let later = self.later.get(&first).map_or(&[][..], Vec::as_slice);
+        std::iter::once(first).chain(later.iter().copied())
+    }
 }
 
 /// Whether two faces with area meet in more than the corners or the edge that they share by index.
@@ -126,6 +158,16 @@ mod tests {
                 vec![[c, off(a, c), off(b, c)]]
             }
         }
+    }
+
+    /// It took hours, because all pairs of faces share their boxes.
+    #[test]
+    fn a_million_faces_that_coincide_take_the_time_of_reading_them() {
+        let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let mut faces = vec![[0, 1, 2]; 1_000_000];
+        faces.push([0, 1, 3]);
+        let mesh = TriangleMesh::new(vertices, faces).unwrap();
+        assert_eq!(self_intersections(&mesh, &[], &HashSet::new()), Vec::<[u32; 2]>::new());
     }
 
     proptest! {
