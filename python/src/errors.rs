@@ -22,6 +22,7 @@ use tesdf_sim::{DynamicsError, MassError, SimulateError};
 
 use crate::classes::{self, Checked};
 use crate::wording::in_python;
+use crate::pool::MOST;
 
 /// Errors that occur while the interpreter's lock is released.
 #[derive(Debug)]
@@ -56,6 +57,8 @@ pub enum Error {
     /// The run file, and a name that none of its bodies has.
     NoBody(PathBuf, String),
     Threads(rayon::ThreadPoolBuildError),
+    /// More threads than [`MOST`].
+    TooManyThreads(usize),
     #[cfg(feature = "gpu")]
     Device(tesdf_gpu::GpuError),
     /// This process was forked from one that has used a device.
@@ -107,6 +110,7 @@ impl Error {
             Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
             Self::Collide(_) | Self::CollideAt(..) => new(py, "CollideError", self.text()),
             Self::Threads(_) => PyOSError::new_err(self.text()),
+            Self::TooManyThreads(_) => PyValueError::new_err(self.text()),
             #[cfg(feature = "gpu")]
             Self::Device(tesdf_gpu::GpuError::Collide(_)) => new(py, "CollideError", self.text()),
             #[cfg(feature = "gpu")]
@@ -154,6 +158,7 @@ impl Error {
             Self::Playback(e) => e.to_string(),
             Self::NoBody(path, body) => format!("{}: there is no body {body}", path.display()),
             Self::Threads(e) => format!("cannot start threads: {e}"),
+            Self::TooManyThreads(asked) => format!("threads: {asked}; expected at most {MOST}"),
             #[cfg(feature = "gpu")]
             Self::Device(e) => e.to_string(),
             #[cfg(feature = "gpu")]

@@ -28,14 +28,15 @@ pub fn shared() -> Result<Arc<ThreadPool>, Error> {
     }
 }
 
-/// Largest number of threads of a pool; more cost memory and gain nothing.
-const LARGEST: usize = 256;
+/// Largest number of threads that a caller may ask for, as in the command-line tool.
+pub const MOST: usize = 1024;
 
-/// A new pool with this number of threads, or 256 where it is larger, or the shared pool.
+/// A new pool with this number of threads, or the shared pool.
 pub fn of(threads: Option<NonZeroUsize>) -> Result<Arc<ThreadPool>, Error> {
     match threads {
+        Some(threads) if threads.get() > MOST => Err(Error::TooManyThreads(threads.get())),
         Some(threads) => {
-            let pool = ThreadPoolBuilder::new().num_threads(threads.get().min(LARGEST)).build();
+            let pool = ThreadPoolBuilder::new().num_threads(threads.get()).build();
             pool.map(Arc::new).map_err(Error::Threads)
         }
         None => shared(),

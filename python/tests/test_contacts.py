@@ -311,6 +311,7 @@ def test_why_agrees_with_the_contacts(asset):
     ({"reduce": 0}, tesdf.CollideError, "reduction is 0 contacts per pair"),
     ({"reduce": 4, "spread": 4}, ValueError, "spread: given together with reduce; expected one of them"),
     ({"threads": 0}, ValueError, "threads: 0; expected an integer greater than 0"),
+    ({"threads": 10000}, ValueError, "threads: 10000; expected at most 1024"),
 ])
 def test_invalid_options_are_errors(options, error, text):
     scene, _ = balls([[0, 0, 0], [1, 0, 0]])

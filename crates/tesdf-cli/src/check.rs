@@ -1,23 +1,25 @@
-//! `tesdf check MESH`: reports the defects of a mesh.
+//! `tesdf check MESH…`: reports the defects of meshes.
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use tesdf::base::InsideRule;
 use tesdf::mesh::{CheckReport, DefectKind, LoadReport, TriangleMesh, check, other_rules, repair_auto};
+use tesdf_sim::MassProperties;
 
+use crate::terminal::files::{self, Found, Solid};
 use crate::terminal::mesh_file::{self, CadArgs};
 use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf check`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The mesh file.
-    #[arg(help = mesh_file::MESH_HELP)]
-    pub mesh: PathBuf,
+    /// The mesh files.
+    #[arg(value_name = "MESH", required = true, help = mesh_file::MESH_HELP)]
+    pub meshes: Vec<PathBuf>,
     /// How finely CAD files become triangles.
     #[command(flatten)]
     pub cad: CadArgs,
-    /// Print the result as JSON
+    /// Print the result as JSON: an object, or of several files a list of them
     #[arg(long)]
     pub json: bool,
 }
@@ -30,29 +32,37 @@ struct Report<'a> {
     check: &'a CheckReport,
     /// The command that makes the mesh work, found by trying; `null` when it works as it is.
     suggestion: Option<String>,
+    /// `null` when the mesh cannot be encoded.
+    solid: Option<Solid>,
 }
 
-/// Reads and checks a mesh, and prints the result.
+/// Reads and checks meshes, and prints the results.
 ///
 /// # Errors
-/// The mesh cannot be read, or stdout cannot be written.
+/// A mesh cannot be read, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let loaded = args.cad.read(&args.mesh)?;
-    let found = check(&loaded.mesh);
-    let way = suggestion(&args.mesh, &loaded.mesh, &found);
-    if args.json {
-        let file = args.mesh.display().to_string();
+    files::each(&args.meshes, args.json, |path| check_one(args, path))
+}
+
+fn check_one(args: &Args, path: &Path) -> Result<Found, Failure> {
+    let loaded = args.cad.read(path)?;
+    let (mesh, found) = (&loaded.mesh, check(&loaded.mesh));
+    let way = suggestion(path, mesh, &found);
+    let properties = || MassProperties::of_triangles((0..mesh.faces().len()).map(|face| mesh.triangle(face)));
+    let solid = found.encodable.then(properties).and_then(Result::ok).map(Solid::of);
+    let result = if args.json {
+        let file = path.display().to_string();
         let suggestion = way.as_ref().map(|way| way.command.clone());
-        report::json(&Report { file, load: &loaded.report, check: &found, suggestion })?;
+        report::to_json(&Report { file, load: &loaded.report, check: &found, suggestion, solid })? + "\n"
     } else {
-        let text = mesh_file::describe(&args.mesh, &loaded.report);
-        report::text(&format!("{text}{found}\n"))?;
-    }
-    if found.encodable {
-        return Ok(Outcome::Good);
-    }
-    report::hint(&next(way.as_ref()));
-    Ok(Outcome::NotGood)
+        let unit = loaded.report.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+        let solid = solid.map_or(String::new(), |solid| report::columns(&solid.rows(&unit)));
+        format!("{}{solid}{found}\n", mesh_file::describe(path, &loaded.report))
+    };
+    Ok(match found.encodable {
+        true => Found { outcome: Outcome::Good, result, hint: None },
+        false => Found { outcome: Outcome::NotGood, result, hint: Some(next(way.as_ref())) },
+    })
 }
 
 /// A way on for a mesh that cannot be encoded as it is.

@@ -6,11 +6,12 @@ use std::time::Instant;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::asset::about::{Repair, Source, Statistics};
-use tesdf::base::unit;
+use tesdf::base::{InsideRule, unit};
 use tesdf::domain::tetrahedra_files;
 use tesdf::encode::{DomainChoice, EncodeOptions, Encoder, Method};
 use tesdf::mesh::{
-    Defect, LoadReport, LoadedSolid, MeshFormat, RepairReport, Severity, SolidMesh, SolidOptions,
+    Defect, LoadReport, LoadedSolid, MeshFormat, ReadSolidError, RepairReport, Severity, SolidMesh,
+    SolidOptions,
 };
 use tesdf::{Certificate, Progress, TeSdf};
 use tesdf_sim::robot::RobotFormat;
@@ -143,7 +144,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let options = choices.options().map_err(Failure::new)?;
     let how =
         SolidOptions { inside: options.inside, repair: args.choices.repair_mode(), cad: args.cad.options() };
-    let loaded = pool.install(|| SolidMesh::load(&args.mesh, &how)).map_err(Failure::new)?;
+    let loaded = pool.install(|| SolidMesh::load(&args.mesh, &how)).map_err(|e| refused(args, &e))?;
     let source = loaded.source();
     let LoadedSolid { solid, report: load, repaired, .. } = loaded;
     let options = options.or_unit(load.unit.as_deref());
@@ -270,4 +271,26 @@ fn print(args: &Args, before: &Before, asset: &TeSdf, seconds: f64) -> Result<()
         ("exact", exactness(about.certificate())),
         ("time", format!("{seconds:.1} s")),
     ])
+}
+
+/// Why a mesh is refused, with the commands that would take it.
+fn refused(args: &Args, error: &ReadSolidError) -> Failure {
+    let failure = Failure::new(error);
+    let ReadSolidError::NotSolid { source, .. } = error else { return failure };
+    let (mesh, output) = (args.mesh.display(), args.output.display());
+    let mut ways: Vec<String> = Vec::new();
+    if let Some(options) = source.suggestion() {
+        ways.push(format!(
+            "`tesdf repair {mesh} -o FILE.ply{options}`, or `--repair auto` here, makes it encodable"
+        ));
+    } else {
+        ways.push(format!("`tesdf check {mesh}` lists all defects"));
+    }
+    ways.extend(source.rules().iter().map(|rule| match rule {
+        InsideRule::Sheet { thickness } => {
+            format!("`--inside sheet --thickness {thickness}` takes its faces as sheets")
+        }
+        rule => format!("`tesdf encode {mesh} -o {output} --inside {}` takes it as it is", rule.name()),
+    }));
+    failure.hint(ways.join("; "))
 }

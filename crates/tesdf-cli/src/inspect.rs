@@ -1,21 +1,26 @@
-//! `tesdf inspect FILE`: prints the contents of a `.tesdf` file.
-use std::path::PathBuf;
+//! `tesdf inspect FILE…`: prints the contents of `.tesdf` files.
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Serialize;
 use tesdf::asset::about::{Repair, Source, Statistics};
+use tesdf::collide::Shape;
 use tesdf::encode::EncodeOptions;
 use tesdf::inspect::{InspectOptions, Inspection, inspect};
 use tesdf::{Certificate, Length};
+use tesdf_sim::MassProperties;
 
 use crate::terminal::asset_file;
+use crate::terminal::files::{self, Found, Solid};
 use crate::terminal::report::{self, Failure, Outcome, count, size};
 
 /// Arguments of `tesdf inspect`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// A .tesdf file
-    pub file: PathBuf,
-    /// Print the result as JSON
+    /// .tesdf files
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Print the result as JSON: an object, or of several files a list of them
     #[arg(long)]
     pub json: bool,
 }
@@ -32,18 +37,25 @@ struct Report<'a> {
     options: &'a EncodeOptions,
     certificate: &'a Certificate,
     statistics: &'a Statistics,
+    /// `null` where the faces do not enclose the inside.
+    solid: Option<Solid>,
 }
 
-/// Opens an asset, which checks its structure, and prints its contents.
+/// Opens assets, which checks their structure, and prints their contents.
 ///
 /// # Errors
-/// The asset cannot be opened, or stdout cannot be written.
+/// An asset cannot be opened, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let asset = asset_file::open(&args.file)?;
+    files::each(&args.files, args.json, |path| inspect_one(args, path))
+}
+
+fn inspect_one(args: &Args, path: &Path) -> Result<Found, Failure> {
+    let asset = Arc::new(asset_file::open(path)?);
     let found = inspect(&asset, &InspectOptions::default());
     let about = asset.about();
+    let of_faces = || MassProperties::of_shape(&Shape::Mesh(Arc::clone(&asset)), 1.0, 1.0).ok();
     let report = Report {
-        file: args.file.display().to_string(),
+        file: path.display().to_string(),
         format_version: asset.container().version(),
         unit: about.options.unit.as_deref(),
         found: &found,
@@ -51,13 +63,13 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         options: &about.options,
         certificate: about.certificate(),
         statistics: &about.statistics,
+        solid: asset.faces_enclose_the_solid().then(of_faces).flatten().map(Solid::of),
     };
-    if args.json {
-        report::json(&report)?;
-    } else {
-        report::table(&rows(&report))?;
-    }
-    Ok(Outcome::Good)
+    let result = match args.json {
+        true => report::to_json(&report)? + "\n",
+        false => report::columns(&rows(&report)),
+    };
+    Ok(Found { outcome: Outcome::Good, result, hint: None })
 }
 
 fn inside(certificate: &Certificate) -> String {
@@ -94,6 +106,9 @@ fn rows(report: &Report) -> Vec<(String, String)> {
         ("mesh", format!("{}, {}", count(counts.faces, "face"), count(counts.vertices, "vertex"))),
         ("diagonal", length(statistics.diagonal)),
         ("inside", inside(certificate)),
+    ];
+    rows.extend(report.solid.iter().flat_map(|solid| solid.rows(&unit)));
+    rows.extend([
         (
             "cells with a list",
             format!("{}, {} of them at the surface", counts.listed_cells, counts.crossing_cells),
@@ -115,7 +130,7 @@ fn rows(report: &Report) -> Vec<(String, String)> {
             ),
         ),
         ("", String::new()),
-    ];
+    ]);
     if let Some(c) = classes {
         let [surface, inner, outer] = [c.surface_vertices, c.inner_vertices, c.outer_vertices];
         let vertices = format!("{surface} of the surface, {inner} inside, {outer} outside");

@@ -1,5 +1,6 @@
 /// The reason why an operation on a device failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GpuError {
     /// This machine has no device that kernels can run on.
     #[error(

@@ -4,6 +4,7 @@ use tesdf::mesh::{MeshError, NotSolid};
 
 /// Why a part cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PartError {
     /// A thread size that is not in the table.
     #[error("{found} is not in the table of sizes; expected one of {known}")]

@@ -2,6 +2,7 @@ use tesdf::collide::CollideError;
 
 /// Why a run cannot be played.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlaybackError {
     /// The run has no states.
     #[error("the run has no states; simulate the scene again")]

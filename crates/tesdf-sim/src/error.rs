@@ -3,6 +3,7 @@ use tesdf::collide::CollideError;
 
 /// Why a step or a state is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DynamicsError {
     /// The system has no body of this number.
     #[error("there is no body {body}; the system has {bodies}, counted from 0")]

@@ -32,6 +32,7 @@ pub fn inertia_matrix([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> DMat3 {
 
 /// Why a body has no mass properties.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MassError {
     /// The density or mass is not a positive finite number.
     #[error("{what} {found}; expected a finite number greater than 0")]

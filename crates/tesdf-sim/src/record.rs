@@ -119,6 +119,7 @@ pub struct RecordedContact {
 
 /// Why a run file cannot be written or read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordError {
     /// An error while the file was written.
     #[error(transparent)]

@@ -88,6 +88,7 @@ pub struct Moment<'a> {
 
 /// Why a run ended before its duration.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimulateError {
     /// A step failed.
     #[error("step {step}: {source}")]

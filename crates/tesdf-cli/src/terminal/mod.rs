@@ -4,6 +4,7 @@
 //! Stdout carries only a command's result; notes, warnings, errors and progress go to stderr.
 pub mod asset_file;
 pub mod device;
+pub mod files;
 pub mod interrupt;
 pub mod mesh_file;
 pub mod output;

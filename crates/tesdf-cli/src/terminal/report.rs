@@ -148,10 +148,15 @@ pub fn text(text: &str) -> Result<(), Failure> {
 /// # Errors
 /// The same errors as [`result`].
 pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
-    let mut bytes =
-        serde_json::to_vec_pretty(value).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))?;
-    bytes.push(b'\n');
-    result(&bytes)
+    result((to_json(value)? + "\n").as_bytes())
+}
+
+/// `value` as indented JSON.
+///
+/// # Errors
+/// It has none.
+pub fn to_json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))
 }
 
 /// Writes names and values to stdout in two columns.
@@ -159,11 +164,16 @@ pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
 /// # Errors
 /// The same errors as [`result`].
 pub fn table<N: AsRef<str>, V: fmt::Display>(rows: &[(N, V)]) -> Result<(), Failure> {
+    text(&columns(rows))
+}
+
+/// Names and values in two columns.
+pub fn columns<N: AsRef<str>, V: fmt::Display>(rows: &[(N, V)]) -> String {
     let width = rows.iter().map(|(name, _)| name.as_ref().chars().count()).max().unwrap_or(0);
     // A value from a file may contain line ends, which would look like new rows.
     let row =
         |name: &str, value: &V| format!("{name:<width$}  {value}").trim_end().replace('\n', "\\n") + "\n";
-    text(&rows.iter().map(|(name, value)| row(name.as_ref(), value)).collect::<String>())
+    rows.iter().map(|(name, value)| row(name.as_ref(), value)).collect()
 }
 
 /// A number with its noun: `1 face`, `2 faces`.

@@ -147,7 +147,7 @@ fn a_mesh_is_repaired_while_it_is_encoded() {
     folder.write("open.obj", format!("{VERTICES}{}", &FACES[10..]));
     let (code, _, err) = folder.tesdf(&["encode", "open.obj", "-o", "a.tesdf"]);
     assert_eq!(code, Some(2));
-    assert!(err.contains("--fill-holes` makes it encodable, and so does `--repair auto`"), "{err}");
+    assert!(err.contains("--fill-holes`, or `--repair auto` here, makes it encodable"), "{err}");
     let encode = ["encode", "open.obj", "-o", "a.tesdf", "--repair", "auto"];
     let (code, out, err) = folder.tesdf(&encode);
     assert_eq!(code, Some(0), "{err}");

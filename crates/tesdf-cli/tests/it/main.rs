@@ -13,6 +13,7 @@ mod folder;
 mod inside;
 #[cfg(target_os = "linux")]
 mod interrupts;
+mod json_keys;
 #[cfg(unix)]
 mod kills;
 #[cfg(target_os = "linux")]

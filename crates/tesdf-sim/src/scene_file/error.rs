@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 /// Why a scene cannot be loaded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
     #[error("cannot read {}: {source}", .path.display())]

@@ -493,7 +493,7 @@ fn a_mesh_is_encoded_with_the_rule_of_its_body() {
     assert!((shape.signed_distance(DVec3::new(0.5, 0.5, 1.0)) - 1.0).abs() < 1e-12);
 
     for (body, says) in [
-        ("mesh = \"plate.obj\"", "--inside sheet"),
+        ("mesh = \"plate.obj\"", "The rule `sheet`"),
         ("mesh = \"plate.obj\"\ninside = \"sheet\"", "needs its thickness"),
         ("mesh = \"plate.obj\"\ninside = \"all\"", "expected winding, nonzero, odd, generalized or sheet"),
         ("shape = \"plane\"\ninside = \"odd\"", "an asset has its own"),

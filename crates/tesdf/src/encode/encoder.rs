@@ -264,6 +264,7 @@ impl TeSdf {
 
 /// Why a mesh file cannot be encoded. The message names the file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EncodeFileError {
     /// The file gives no solid.
     #[error(transparent)]

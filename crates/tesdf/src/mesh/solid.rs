@@ -262,6 +262,7 @@ pub struct LoadedSolid {
 
 /// Why a mesh file does not give a [`SolidMesh`]. The message names the file.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReadSolidError {
     /// The file cannot be read as a mesh.
     #[error("{}", source.in_file(path))]
@@ -346,32 +347,25 @@ impl fmt::Display for NotSolid {
             f.write_str("; and other defects")?;
         }
         match &self.suggestion {
-            Some(options) => write!(
-                f,
-                ". `tesdf repair MESH -o FILE.ply{options}` makes it encodable, and so does `--repair auto` while it \
-                 is encoded"
-            )?,
-            None => {
-                f.write_str(". `tesdf repair` cannot make it encodable: `tesdf check` lists all defects")?
-            }
+            Some(_) => f.write_str(". The repair `auto` makes it encodable")?,
+            None => f.write_str(". No repair makes it encodable")?,
         }
         self.rules.iter().try_for_each(|rule| write_way_on(f, *rule))
     }
 }
 
-/// How a rule treats a mesh that is refused under another rule, and its flag.
+/// How a rule, by the name that it has everywhere, treats a mesh that is refused under another one.
 fn write_way_on(f: &mut fmt::Formatter<'_>, rule: InsideRule) -> fmt::Result {
     match rule {
         InsideRule::Winding | InsideRule::Odd => Ok(()),
-        InsideRule::Nonzero => f.write_str(". `--inside nonzero` takes shells that are inside out as solids"),
+        InsideRule::Nonzero => f.write_str(". The rule `nonzero` takes shells that are inside out as solids"),
         InsideRule::Generalized => f.write_str(
-            ". `--inside generalized` takes it as the solid that its faces enclose for the most part (generalised \
+            ". The rule `generalized` takes it as the solid that its faces enclose for the most part (generalised \
              winding number)",
         ),
         InsideRule::Sheet { thickness } => write!(
             f,
-            ". `--inside sheet --thickness {thickness}` takes its faces as sheets of a thickness, here of some 1 % of \
-             its diagonal"
+            ". The rule `sheet` takes its faces as sheets of a thickness: {thickness} is some 1 % of its diagonal"
         ),
     }
 }

@@ -80,6 +80,7 @@ fn errors_name_the_file_once_and_carry_the_cause() {
             EncodeFileError::Solid(ReadSolidError::Read { .. }) => "read",
             EncodeFileError::Solid(ReadSolidError::NotSolid { .. }) => "not solid",
             EncodeFileError::Encode { .. } => "encode",
+            _ => "other",
         };
         assert_eq!((found, error.path()), (kind, path.as_path()));
         let text = error.to_string();

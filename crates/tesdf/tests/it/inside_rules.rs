@@ -221,7 +221,7 @@ fn refusals_name_the_rules_that_take_the_mesh() {
     let error = SolidMesh::new(open.clone()).expect_err("open");
     assert_eq!(error.rules(), [Generalized, Sheet { thickness: 0.01 }]);
     let text = error.to_string();
-    assert!(text.contains("--inside generalized") && text.contains("--inside sheet --thickness"), "{text}");
+    assert!(text.contains("rule `generalized`") && text.contains("rule `sheet`"), "{text}");
     for rule in [Nonzero, Odd] {
         assert!(SolidMesh::with_inside(open.clone(), rule.into()).is_err(), "{rule:?}");
     }
@@ -231,12 +231,15 @@ fn refusals_name_the_rules_that_take_the_mesh() {
     let plate = Parts { vertices, faces: vec![[0, 1, 2], [0, 2, 3]] }.turned().mesh();
     let error = SolidMesh::new(plate).expect_err("open");
     assert_eq!(error.rules(), [Sheet { thickness: 0.01 }]);
-    assert!(error.to_string().contains("--inside sheet --thickness 0.01`"), "{error}");
+    assert!(
+        error.to_string().contains("rule `sheet` takes its faces as sheets of a thickness: 0.01 is"),
+        "{error}"
+    );
 
     let inward = Parts::default().cube(DVec3::ZERO, 1.0, Inward).mesh();
     let error = SolidMesh::new(inward).expect_err("inside out");
     assert!(error.report().defects.iter().any(|d| d.kind == DefectKind::NoInside));
-    assert!(error.to_string().contains("--inside nonzero"), "{error}");
+    assert!(error.to_string().contains("rule `nonzero`"), "{error}");
 
     let twice = Parts::default().cube(DVec3::ZERO, 1.0, Outward).cube(DVec3::ZERO, 1.0, Outward).mesh();
     let error = SolidMesh::with_inside(twice, Odd.into()).expect_err("even everywhere");

@@ -46,7 +46,7 @@ fn a_refusal_names_the_options_that_work() {
     let options = RepairOptions { fill_holes: Some(u32::MAX), ..RepairOptions::DEFAULT };
     assert_eq!(refusal.suggestion(), Some(&options));
     let text = refusal.to_string();
-    assert!(text.contains("`tesdf repair MESH -o FILE.ply --fill-holes` makes it encodable"), "{text}");
+    assert!(text.contains(". The repair `auto` makes it encodable"), "{text}");
     let (solid, changes) =
         SolidMesh::with_repair(load("open_half.obj"), Inside::default(), RepairMode::Auto).unwrap();
     assert_eq!(changes.unwrap().options, Some(options));

@@ -2,6 +2,7 @@ use crate::collide::scene::ids::{InstanceId, ShapeId};
 
 /// Why a scene or a detection is refused. The scene is unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CollideError {
     /// The numbers are not a rigid motion.
     #[error("not a pose: {found}; expected {expected}")]
