@@ -1,6 +1,7 @@
 //! `tesdf.encode`
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -12,7 +13,7 @@ use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
 use crate::errors::{Error, argument, kind_of};
-use crate::interrupt::cancellable;
+use crate::interrupt::abandonable;
 use crate::mesh::MeshInput;
 use crate::pool;
 
@@ -77,19 +78,21 @@ pub fn encode(
     let options = choices.options().map_err(|e| Error::Choice(e).raise(py))?;
     let input = MeshInput::new(mesh)?;
     let pool = pool::of(threads).map_err(|e| e.raise(py))?;
-    let state = Progress::default();
-    let work = || {
+    let state = Arc::new(Progress::default());
+    let (asked, shared) = (choices.clone(), Arc::clone(&state));
+    let work = move || {
+        let (choices, state) = (asked, &*shared);
         pool.install(|| {
             let loaded = input.load()?;
             let of_file = loaded.unit.clone();
             let (solid, path, source) = loaded.solid(options.inside, repair)?;
-            let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
+            let tetrahedra = choices.tetrahedra(&solid, state).map_err(Error::Domain)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
             Encoder::new()
                 .options(options.or_unit(of_file.as_deref()))
                 .domain(domain)
                 .source(source)
-                .progress(&state)
+                .progress(state)
                 .encode(&solid)
                 .map(|asset| (asset, of_file))
                 .map_err(|e| Error::Encode(path, e))
@@ -107,7 +110,7 @@ pub fn encode(
         }
         None => Ok(()),
     };
-    let (encoded, of_file) = cancellable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
+    let (encoded, of_file) = abandonable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
     watch()?;
     if let Some(found) = unit::conflict(of_file.as_deref(), choices.unit.as_deref()) {
         py.import("warnings")?.call_method1("warn", (found,))?;

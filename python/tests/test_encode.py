@@ -1,5 +1,9 @@
 """Mesh arguments, options, progress and Ctrl-C."""
 
+import os
+import signal
+import threading
+import time
 import types
 
 import numpy as np
@@ -115,6 +119,34 @@ SAYING = [
 def test_ctrl_c_ends_encode():
     body = [*SAYING, "tesdf.encode(sys.argv[1], progress=progress)"]
     ended_by_ctrl_c(body, DATA / "procedural" / "iso_m16_bolt_24k.obj")
+
+
+def test_ctrl_c_ends_encode_at_once():
+    # A torus of 328,050 faces. Its check takes seconds, and does not notice that it is cancelled.
+    n = 405
+    angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
+    u, v = np.meshgrid(angle, angle, indexing="ij")
+    radius = 1 + 0.3 * np.cos(v)
+    vertices = np.stack([radius * np.cos(u), radius * np.sin(u), 0.3 * np.sin(v)], -1).reshape(-1, 3)
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    a, b, c, d = (k % n * n + m % n for k, m in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)))
+    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    sent = []
+
+    def interrupt():
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.5, interrupt)
+    try:
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            tesdf.encode((vertices, faces))
+        assert time.monotonic() - sent[0] < 1
+    finally:
+        timer.cancel()
+        signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_ends_verify():
