@@ -73,7 +73,9 @@ fn sheets_are_not_filled() {
         let sheet = TriangleMesh::new(vertices, (0..(n - 1) * (n - 1)).flat_map(square).collect()).unwrap();
         assert_eq!(flags(&sheet), None, "height {height}");
         let refusal = SolidMesh::with_repair(sheet, Inside::default(), RepairMode::Auto).unwrap_err();
-        assert!(refusal.suggestion().is_none() && refusal.to_string().contains("cannot make it encodable"));
+        assert!(
+            refusal.suggestion().is_none() && refusal.to_string().contains("No repair makes it encodable")
+        );
     }
 }
 
