@@ -55,7 +55,7 @@ use crate::pool;
 ///   these that makes it encodable, duplicates and T-junctions and orientation, welding of cracks,
 ///   filling of holes. The asset records what was changed (asset.source.repair). None refuses such
 ///   a mesh.
-/// - threads: number of threads, at most 256; None is one per core. The bytes of the asset do not depend on it.
+/// - threads: number of threads, at most 1024; None is one per core. The bytes of the asset do not depend on it.
 /// - progress: called with the stage ("refine", "tighten", "assemble") and the completed fraction
 ///   of it, 0 to 1, about twenty times a second. An exception from it ends the encoding and is
 ///   raised.

@@ -21,8 +21,8 @@ use tesdf_sim::scene_file::SceneError;
 use tesdf_sim::{DynamicsError, MassError, SimulateError};
 
 use crate::classes::{self, Checked};
-use crate::wording::in_python;
 use crate::pool::MOST;
+use crate::wording::in_python;
 
 /// Errors that occur while the interpreter's lock is released.
 #[derive(Debug)]

@@ -1,10 +1,14 @@
 //! Messages of the library in Python's terms: it speaks of the tool's commands and flags.
 
 /// What the library says outside of code, and what Python has in its place.
-const PHRASES: [(&str, &str); 3] = [
+const PHRASES: [(&str, &str); 7] = [
     ("tesdf encode MESH -o FILE.tesdf", "tesdf.encode(mesh).save(\"FILE.tesdf\")"),
     ("that tesdf encode wrote", "that Asset.save wrote"),
     ("encode the mesh without --unit", "encode the mesh without unit"),
+    ("The repair `auto`", "`repair=\"auto\"`"),
+    ("The rule `nonzero`", "`inside=\"nonzero\"`"),
+    ("The rule `generalized`", "`inside=\"generalized\"`"),
+    ("The rule `sheet`", "`inside=\"sheet\"`"),
 ];
 
 /// A message with `--flag value` and `tesdf command` within backticks as Python has them:

@@ -166,7 +166,7 @@ def test_ctrl_c_ends_gmsh(tmp_path):
 def test_inside():
     vertices, faces = TETRAHEDRON
     open_mesh = (vertices, faces[:-1])
-    with pytest.raises(tesdf.NotSolidError, match="rule `generalized`"):
+    with pytest.raises(tesdf.NotSolidError, match='inside="generalized"'):
         tesdf.encode(open_mesh)
     asset = tesdf.encode(open_mesh, "fast", inside="generalized")
     assert asset.certificate.inside["rule"] == "generalized" and asset.certificate.jumps
