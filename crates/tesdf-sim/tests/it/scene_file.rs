@@ -385,8 +385,8 @@ fn a_mesh_is_repaired_if_the_body_says_so() {
     let Mass::Free(mass) = system.bodies()[0].mass else { panic!("the body is fixed") };
     assert!((mass.mass - 1.0).abs() < 1e-12, "the volume is that of the whole cube: {}", mass.mass);
     for (repair, expected) in [
-        ("", "--fill-holes` makes it encodable"),
-        ("repair = \"never\"", "--fill-holes` makes it encodable"),
+        ("", "The repair `auto` makes it encodable"),
+        ("repair = \"never\"", "The repair `auto` makes it encodable"),
         ("repair = \"always\"", "repair = 'always'; expected 'auto' or 'never'"),
     ] {
         let error = open(&body(repair)).expect_err("it has a hole").to_string();

@@ -43,7 +43,7 @@ pub fn lowest(
 ) -> Option<Lowest> {
     if let CellField::Simple(simple) = *cell {
         let points: ArrayVec<DVec3, MAX_VERTICES> = polygon.points().collect();
-        let point = simple_shape::lowest(simple, &points);
+        let point = simple_shape::lowest(simple, &points, normal);
         return (simple.value(point).distance <= reach).then_some(Lowest {
             point,
             converged: true,

@@ -9,15 +9,16 @@ use glam::DVec3;
 
 use crate::collide::scene::simple::Simple;
 use crate::collide::search::greatest_minimum::{CORNERS, summit};
-use crate::geometry::Triangle;
+use crate::geometry::{Feature, Triangle};
 
 /// A place within a segment or triangle is taken if it is lower than its corners by more than this
 /// fraction of the numbers in the computation. Otherwise rounding would decide where all are alike,
 /// and faces around a corner would not have the same contact there.
 const LOWER: f64 = 1e-14;
 
-/// The lowest point of a segment or triangle, up to rounding.
-pub fn lowest(simple: Simple, points: &[DVec3]) -> DVec3 {
+/// The lowest of one to three points and what is between them, up to rounding. `normal` is that of a
+/// triangle; zero where it has no area.
+pub fn lowest(simple: Simple, points: &[DVec3], normal: DVec3) -> DVec3 {
     let mut best = (f64::INFINITY, DVec3::ZERO);
     let mut offer = |p: DVec3, margin: f64| {
         let distance = simple.value(p).distance;
@@ -38,6 +39,18 @@ pub fn lowest(simple: Simple, points: &[DVec3]) -> DVec3 {
     let size = points.iter().fold(half, |size, p| size.max(p.abs())).max_element();
     let margin = LOWER * size;
     let corners = [points[0], points[1], points[points.len() - 1]];
+    // Under the corner of the box that is lowest along the normal. Where a side of the box is parallel
+    // to the part, that is a corner of what touches, so `Patch::extremes` need not add one there: it
+    // has the same bits.
+    let triangle = Triangle::with_normal(corners, normal);
+    if points.len() == 3 && normal != DVec3::ZERO {
+        for normal in [normal, -normal] {
+            let corner = half * normal.map(|x| if x < 0.0 { 1.0 } else { -1.0 });
+            if triangle.closest(corner).feature == Feature::Face {
+                offer(corner - normal.dot(corner - corners[0]) * normal, margin);
+            }
+        }
+    }
     if !is_apart(half, &corners) {
         let within = offer(deepest_in_sides(half, &corners), margin);
         // Where the part enters the box, the sides alone give the depth.
@@ -48,15 +61,6 @@ pub fn lowest(simple: Simple, points: &[DVec3]) -> DVec3 {
     let edges = if points.len() == 2 { 1 } else { 3 };
     for k in 0..edges {
         offer(nearest_on_segment(half, corners[k], corners[(k + 1) % 3]), margin);
-    }
-    // Where the nearest point is not on an edge, the nearest corner of the box is the lowest one along
-    // the normal of the triangle.
-    let triangle = Triangle::new(corners);
-    if points.len() == 3 && triangle.normal != DVec3::ZERO {
-        for normal in [triangle.normal, -triangle.normal] {
-            let corner = half * normal.map(|x| if x < 0.0 { 1.0 } else { -1.0 });
-            offer(triangle.closest(corner).point, margin);
-        }
     }
     best.1
 }
@@ -177,13 +181,13 @@ mod tests {
                 3 => corners[2] = corners[0].lerp(corners[1], 0.4) + 1e-9,
                 _ => {}
             }
-            let point = lowest(simple, &corners);
+            let triangle = Triangle::new(corners);
+            let point = lowest(simple, &corners, triangle.normal);
             let distance = simple.value(point).distance;
             let least = sampled(simple, corners);
             assert!(distance <= least + 1e-12, "case {case}: {distance} {least} {simple:?} {corners:?}");
-            let triangle = Triangle::new(corners);
             assert!(triangle.closest(point).distance < 1e-14, "case {case}: on the triangle");
-            let segment = lowest(simple, &corners[..2]);
+            let segment = lowest(simple, &corners[..2], DVec3::ZERO);
             let least = sampled(simple, [corners[0], corners[1], corners[1]]);
             assert!(simple.value(segment).distance <= least + 1e-12, "case {case}");
             inside += usize::from(distance < 0.0);
@@ -198,7 +202,7 @@ mod tests {
         let simple = Simple::Box(DVec3::new(1.0, 1.0, 0.1));
         for height in [0.3, 0.1, 0.1 - 1e-7] {
             let corners = [(0.1, 0.2), (0.7, 0.3), (0.2, 0.9)].map(|(x, y)| DVec3::new(x, y, height));
-            assert!(corners.contains(&lowest(simple, &corners)));
+            assert!(corners.contains(&lowest(simple, &corners, DVec3::Z)));
         }
     }
 }
