@@ -21,7 +21,6 @@ use tesdf_sim::scene_file::SceneError;
 use tesdf_sim::{DynamicsError, MassError, SimulateError};
 
 use crate::classes::{self, Checked};
-use crate::pool::MOST;
 use crate::wording::in_python;
 
 /// Errors that occur while the interpreter's lock is released.
@@ -57,8 +56,8 @@ pub enum Error {
     /// The run file, and a name that none of its bodies has.
     NoBody(PathBuf, String),
     Threads(rayon::ThreadPoolBuildError),
-    /// More threads than [`MOST`].
-    TooManyThreads(usize),
+    /// The number of threads asked for, and the greatest one.
+    TooManyThreads(usize, usize),
     #[cfg(feature = "gpu")]
     Device(tesdf_gpu::GpuError),
     /// This process was forked from one that has used a device.
@@ -110,7 +109,7 @@ impl Error {
             Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
             Self::Collide(_) | Self::CollideAt(..) => new(py, "CollideError", self.text()),
             Self::Threads(_) => PyOSError::new_err(self.text()),
-            Self::TooManyThreads(_) => PyValueError::new_err(self.text()),
+            Self::TooManyThreads(..) => PyValueError::new_err(self.text()),
             #[cfg(feature = "gpu")]
             Self::Device(tesdf_gpu::GpuError::Collide(_)) => new(py, "CollideError", self.text()),
             #[cfg(feature = "gpu")]
@@ -158,7 +157,7 @@ impl Error {
             Self::Playback(e) => e.to_string(),
             Self::NoBody(path, body) => format!("{}: there is no body {body}", path.display()),
             Self::Threads(e) => format!("cannot start threads: {e}"),
-            Self::TooManyThreads(asked) => format!("threads: {asked}; expected at most {MOST}"),
+            Self::TooManyThreads(asked, most) => format!("threads: {asked}; expected at most {most}"),
             #[cfg(feature = "gpu")]
             Self::Device(e) => e.to_string(),
             #[cfg(feature = "gpu")]

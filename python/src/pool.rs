@@ -29,12 +29,12 @@ pub fn shared() -> Result<Arc<ThreadPool>, Error> {
 }
 
 /// Largest number of threads that a caller may ask for, as in the command-line tool.
-pub const MOST: usize = 1024;
+const MOST: usize = 1024;
 
 /// A new pool with this number of threads, or the shared pool.
 pub fn of(threads: Option<NonZeroUsize>) -> Result<Arc<ThreadPool>, Error> {
     match threads {
-        Some(threads) if threads.get() > MOST => Err(Error::TooManyThreads(threads.get())),
+        Some(threads) if threads.get() > MOST => Err(Error::TooManyThreads(threads.get(), MOST)),
         Some(threads) => {
             let pool = ThreadPoolBuilder::new().num_threads(threads.get()).build();
             pool.map(Arc::new).map_err(Error::Threads)
