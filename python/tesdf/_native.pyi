@@ -93,8 +93,6 @@ def polygons(
     - corners: ids of the points of all polygons.
 
     Returns (vertices [V, 3], faces [F, 3], notes). Raises MeshError if an id or a point is wrong."""
-def pose(name: str, pose: npt.ArrayLike) -> list[float]:
-    """The seven numbers of a pose, x y z qx qy qz qw, of these or of a matrix [4, 4]. Errors name it."""
 def asset_of(mesh: Mesh) -> Asset:
     """The asset of a mesh: an Asset as it is, that of a file .tesdf, or what encode makes with the
     preset "fast" of any other argument of it. A mesh that was encoded before is found by its content,

@@ -104,7 +104,7 @@ def test_messages_in_terms_of_python():
         tesdf.encode(vertices, faces)
     with pytest.raises(tesdf.NotSolidError) as refused:
         tesdf.signed_distance((vertices, faces[:3]), [0, 0, 0])
-    for text in ("`tesdf.repair(mesh, fill_holes=True)`", '`repair="auto"`', '`inside="sheet", thickness=0.', '`inside="generalized"`'):
+    for text in ('`repair="auto"` makes it encodable', '`inside="sheet"` takes its faces', '`inside="generalized"`'):
         assert text in str(refused.value)
     with pytest.raises(tesdf.AssetError, match=r'encode it first: tesdf.encode\(mesh\).save\("FILE.tesdf"\)'):
         tesdf.Asset.open(CUBE)
@@ -140,4 +140,6 @@ def test_an_asset_in_a_notebook(asset):
 
 
 def test_threads_are_limited(torus):
-    assert tesdf.encode(torus, "fast", threads=10**9).to_bytes() == tesdf.encode(torus, "fast").to_bytes()
+    assert tesdf.encode(torus, "fast", threads=3).to_bytes() == tesdf.encode(torus, "fast").to_bytes()
+    with pytest.raises(ValueError, match="threads: 1000000000; expected at most 1024"):
+        tesdf.encode(torus, "fast", threads=10**9)
