@@ -58,7 +58,7 @@ pub enum PartFacing {
 const AT_SIDE: f64 = 1e-5;
 
 impl Part {
-    fn new(points: &[DVec3], radius: f64) -> Self {
+    pub fn new(points: &[DVec3], radius: f64) -> Self {
         let (normal, facing) = (DVec3::ZERO, PartFacing::Everywhere);
         let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal, facing };
         part.points[..points.len()].copy_from_slice(points);

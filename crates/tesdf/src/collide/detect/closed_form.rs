@@ -1,10 +1,10 @@
-//! Minima that have a closed form: of a point in the field of a simple shape, and of a large part
-//! over a plane. They are those of the search, bit for bit.
+//! Minima that have a closed form: of a point in the field of a simple shape, and of a part that is
+//! large, or flat, over a plane. They are those of the search, bit for bit.
 use glam::DVec3;
 
-use crate::collide::bodies::surface::Part;
+use crate::collide::bodies::surface::{Part, PartFacing};
 use crate::collide::mode::Mode;
-use crate::collide::narrow::extremes::OPPOSES;
+use crate::collide::narrow::extremes::{OPPOSES, is_level};
 use crate::collide::narrow::{Minimum, Search};
 use crate::collide::scene::simple::Simple;
 
@@ -26,10 +26,12 @@ pub fn minima(
             }
             true
         }
-        (_, Simple::Plane)
-            if search.is_of_faces() && matches!(mode, Mode::Exact(_)) && search.is_large(part) =>
-        {
-            over_plane(part, reach, found)
+        (_, Simple::Plane) if search.is_of_faces() && matches!(mode, Mode::Exact(_)) => {
+            if search.is_large(part) {
+                over_plane(part, reach, found)
+            } else {
+                flat_over_plane(search.tolerance, part, reach, found)
+            }
         }
         _ => false,
     }
@@ -59,6 +61,29 @@ fn over_plane(part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool 
     true
 }
 
+/// The minima of a small triangle over the plane z = 0 whose corners are equally high up to the
+/// tolerance: all of them. Returns `false` for others.
+fn flat_over_plane(tolerance: f64, part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool {
+    let &[a, b, c] = part.points() else { return false };
+    if part.normal.z >= OPPOSES || part.facing == PartFacing::AtCenter {
+        return false;
+    }
+    let lower = |p: DVec3, q: DVec3| if q.z < p.z { q } else { p };
+    let lowest = lower(lower(a, b), c);
+    if lowest.z > reach {
+        return true;
+    }
+    let longest = [b - a, c - b, a - c].map(|edge| edge.length_squared()).into_iter().fold(0.0, f64::max);
+    let slope = DVec3::Z.reject_from_normalized(part.normal).length();
+    if [a, b, c].iter().any(|p| p.z > lowest.z + tolerance) || !is_level(slope, longest.sqrt(), tolerance) {
+        return false;
+    }
+    found(at(Simple::Plane, part, lowest, true));
+    let others = [a, b, c].into_iter().filter(|p| *p != lowest);
+    others.for_each(|p| found(at(Simple::Plane, part, p, false)));
+    true
+}
+
 fn at(simple: Simple, part: &Part, point: DVec3, is_lowest: bool) -> Minimum {
     let corner = part.points().iter().position(|p| *p == point).map(|k| k as u8);
     Minimum { point, value: simple.value(point), cell: None, converged: true, corner, is_lowest }
@@ -71,6 +96,7 @@ mod tests {
     use glam::DQuat;
 
     use super::*;
+    use crate::collide::bodies::field::{Field, FieldBody};
     use crate::collide::detect::ordered_pair::OrderedPair;
     use crate::collide::mode::ContactsPer;
     use crate::collide::options::CollideOptions;
@@ -143,5 +169,41 @@ mod tests {
             }
         }
         assert!(closed > 5000 && searched > 500 && contacts > 1500, "{closed} {searched} {contacts}");
+    }
+
+    /// Small triangles over a plane: level, nearly so, tilted, needles, and turned over.
+    #[test]
+    fn flat_parts_have_the_minima_of_the_search() {
+        let mut k = 1;
+        let field = FieldBody::in_own_frame(Field::Simple(Simple::Plane));
+        let options = CollideOptions { mode: Mode::exact(), ..CollideOptions::default() };
+        let search = Search::new(&options, 0.2, &field, [100.0; 2]);
+        let (mut closed, mut searched, mut contacts) = (0, 0, 0);
+        for case in 0..4000 {
+            let mut number = || random(&mut k);
+            let tilt = [0.0, 1e-17, 0.1, 0.5, 3.0][case % 5] * search.tolerance;
+            let wide = [1.0, 0.1, 1e-3][case / 5 % 3];
+            let height = 0.4 * number() - 0.1;
+            let mut corner = || DVec3::new(number(), wide * number(), height + tilt * number());
+            let mut corners = [corner(), corner(), corner()];
+            let is_up = (corners[1] - corners[0]).cross(corners[2] - corners[0]).z > 0.0;
+            if is_up != (case % 11 == 0) {
+                corners.swap(1, 2);
+            }
+            let part = Part::new(&corners, 0.0);
+            assert!(!search.is_large(&part));
+            let (mut found, mut expected) = (Vec::new(), Vec::new());
+            if !minima(Simple::Plane, &search, Mode::exact(), &part, &mut |m| found.push(bits(&m))) {
+                assert!(found.is_empty());
+                searched += 1;
+                continue;
+            }
+            search.minima(&field, &part, None, &mut |_| (), &mut |_, m| expected.push(bits(&m)));
+            found.sort_unstable();
+            expected.sort_unstable();
+            assert_eq!(found, expected, "case {case}");
+            (closed, contacts) = (closed + 1, contacts + found.len());
+        }
+        assert!(closed > 2000 && searched > 500 && contacts > 3000, "{closed} {searched} {contacts}");
     }
 }

@@ -199,7 +199,7 @@ impl<'a> Patch<'a> {
         } else {
             gradient.reject_from_normalized(self.normal)
         };
-        if slope.length() * SMALL * length <= self.search.tolerance {
+        if is_level(slope.length(), length, self.search.tolerance) {
             return true;
         }
         let Some(level) = self.normal.cross(slope).try_normalize() else { return false };
@@ -475,6 +475,12 @@ impl<'a> Patch<'a> {
             _ => self.part.points()[0],
         }
     }
+}
+
+/// Whether a field that rises along a part with this slope is constant, up to the tolerance, over a
+/// piece of the part that matters. `length` is that of the longest edge.
+pub fn is_level(slope: f64, length: f64, tolerance: f64) -> bool {
+    slope * SMALL * length <= tolerance
 }
 
 /// The sides of a part that is a triangle.

@@ -54,7 +54,8 @@ pub struct Search {
     large: f64,
     /// Signed distances above this are ignored.
     pub reach: f64,
-    tolerance: f64,
+    /// Least distances are found up to this.
+    pub tolerance: f64,
     precision: Precision,
 }
 
