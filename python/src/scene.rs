@@ -24,8 +24,9 @@ use crate::{classes, pool, shapes};
 
 /// Shapes, and instances of them with poses; detect finds the contacts.
 ///
-/// - A shape is an Asset, Plane, Box, Sphere or Capsule, or a mesh in memory, (vertices, faces) or an
-///   object that has both, which is encoded with the preset "fast". All its instances share it.
+/// - A shape is an Asset, Plane, Box, Sphere, Capsule or Cylinder, or a mesh in memory, (vertices,
+///   faces) or an object that has both, which is encoded with the preset "fast". All its instances
+///   share it.
 /// - A pose maps the shape's frame to the world's frame: first rotate, then translate. It has seven
 ///   numbers, x y z qx qy qz qw: the translation and a unit quaternion, whose real part qw comes
 ///   last, as in scene files and on the command line. Or it is a matrix [4, 4] that maps columns,
@@ -84,8 +85,8 @@ impl Scene {
         Self { inner: Mutex::default(), on_device: HeldDetector::default() }
     }
 
-    /// Adds a shape: an Asset, which the scene shares, a Plane, Box, Sphere or Capsule. Returns its
-    /// id.
+    /// Adds a shape: an Asset, which the scene shares, a Plane, Box, Sphere, Capsule or Cylinder.
+    /// Returns its id.
     fn add_shape(&self, shape: &Bound<'_, PyAny>) -> PyResult<u32> {
         let added = shapes::shape("shape", shape)?;
         self.change(shape.py(), |scene| scene.add_shape(added)).map(|id| id.0)
@@ -371,7 +372,8 @@ impl Scene {
     /// A point is at a vertex or an edge when it is nearer than 2e-6 of the diagonal of the larger
     /// body, at most 1e-4 of that of the smaller one. Vertices and faces are numbered as in the mesh;
     /// of a Box, faces are its sides 0 to 5 for -x +x -y +y -z +z, and vertices its nodes; a
-    /// Plane, Sphere or Capsule has the face 0.
+    /// Cylinder has the face 0 on its round side, 1 and 2 at its ends at -z and +z; a Plane, Sphere
+    /// or Capsule has the face 0.
     ///
     /// contacts: Contacts of Scene.detect, or the contacts of a Simulation with a scene of its
     /// bodies.

@@ -16,17 +16,19 @@ struct Classes<'a, 'py> {
     cuboid: &'a Bound<'py, PyType>,
     sphere: &'a Bound<'py, PyType>,
     capsule: &'a Bound<'py, PyType>,
+    cylinder: &'a Bound<'py, PyType>,
 }
 
 fn classes(py: Python<'_>) -> PyResult<Classes<'_, '_>> {
-    static CLASSES: [PyOnceLock<Py<PyType>>; 4] = [const { PyOnceLock::new() }; 4];
-    let [plane, cuboid, sphere, capsule] = &CLASSES;
+    static CLASSES: [PyOnceLock<Py<PyType>>; 5] = [const { PyOnceLock::new() }; 5];
+    let [plane, cuboid, sphere, capsule, cylinder] = &CLASSES;
     let module = "tesdf.shapes";
     Ok(Classes {
         plane: plane.import(py, module, "Plane")?,
         cuboid: cuboid.import(py, module, "Box")?,
         sphere: sphere.import(py, module, "Sphere")?,
         capsule: capsule.import(py, module, "Capsule")?,
+        cylinder: cylinder.import(py, module, "Cylinder")?,
     })
 }
 
@@ -56,6 +58,8 @@ pub fn shape(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
         Ok(Shape::Sphere { radius: size("radius")? })
     } else if any.is_instance(classes.capsule)? {
         Ok(Shape::Capsule { half_height: size("half_height")?, radius: size("radius")? })
+    } else if any.is_instance(classes.cylinder)? {
+        Ok(Shape::Cylinder { half_height: size("half_height")?, radius: size("radius")? })
     } else {
         encoded(name, any)
     }
@@ -64,7 +68,7 @@ pub fn shape(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
 /// The asset of a path or of a mesh in memory.
 fn encoded(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Shape> {
     if !is_mesh(any)? {
-        let expected = "an Asset, Plane, Box, Sphere or Capsule, or a mesh: a path, (vertices, faces), or one of \
+        let expected = "an Asset, Plane, Box, Sphere, Capsule or Cylinder, or a mesh: a path, (vertices, faces), or one of \
                         trimesh, Open3D or pyvista";
         return Err(argument(name, kind_of(any), expected));
     }
@@ -80,5 +84,6 @@ pub fn object<'py>(py: Python<'py>, shape: &Shape) -> PyResult<Bound<'py, PyAny>
         Shape::Box { half_extents: half } => classes.cuboid.call1(((half.x, half.y, half.z),)),
         Shape::Sphere { radius } => classes.sphere.call1((*radius,)),
         Shape::Capsule { half_height, radius } => classes.capsule.call1((*half_height, *radius)),
+        Shape::Cylinder { half_height, radius } => classes.cylinder.call1((*half_height, *radius)),
     }
 }

@@ -110,7 +110,7 @@ from .reports import (
     WhyReport,
 )
 from .results import Answers, ClosestPoints, DeviceAnswers, Moved, RayHits, Reencoded, Repaired
-from .shapes import Box, Capsule, Plane, Sphere
+from .shapes import Box, Capsule, Cylinder, Plane, Sphere
 from .usd import UsdMesh, read_usd
 
 __all__ = [
@@ -121,6 +121,7 @@ __all__ = [
     "AssetError",
     "Box",
     "Capsule",
+    "Cylinder",
     "CheckReport",
     "Clearance",
     "Clearances",

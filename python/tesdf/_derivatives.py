@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .shapes import Box, Capsule, Plane, Sphere
+from .shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +41,8 @@ class Placed:
             size = 2 * float(np.linalg.norm(self.shape.half_extents))
         elif isinstance(self.shape, (Plane, Sphere, Capsule)):
             return 0.0
+        elif isinstance(self.shape, Cylinder):
+            size = 2 * float(np.hypot(self.shape.half_height, self.shape.radius))
         else:
             size = float(np.linalg.norm(np.ptp(self.shape.bounds, axis=0)))
         diagonal = size * self.scale
@@ -60,6 +62,11 @@ def _gradients(shape: Any, point: Array, around: Array) -> Array:
         half = shape.half_height if isinstance(shape, Capsule) else 0
         from_axis = around - np.clip(around[:, 2:], -half, half) * [0, 0, 1]
         return np.asarray(from_axis / np.linalg.norm(from_axis, axis=1, keepdims=True))
+    if isinstance(shape, Cylinder):
+        from_axis = around * [1, 1, 0]
+        length = np.linalg.norm(from_axis, axis=1, keepdims=True)
+        is_end = np.abs(around[:, 2:]) - shape.half_height > length - shape.radius
+        return np.asarray(np.where(is_end, np.sign(around[:, 2:]) * [0, 0, 1], from_axis / np.maximum(length, 1e-300)))
     if isinstance(shape, Box):
         side = (np.abs(around) - shape.half_extents).argmax(1)
         return np.asarray(np.eye(3)[side] * np.sign(around))

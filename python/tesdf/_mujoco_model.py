@@ -16,7 +16,7 @@ except ImportError:
         "tesdf.mujoco and tesdf.mujoco_warp need the package mujoco: pip install 'mujoco>=4'"
     ) from None
 
-from . import Asset, Box, Capsule, Plane, Sphere
+from . import Asset, Box, Capsule, Cylinder, Plane, Sphere
 from ._coupling import RIGID_SOLIMP, Float, Placed, check_bounds, rigid_solref
 
 __all__ = ["Geoms", "Integer", "Parameters", "Properties", "Solref", "checked_solref", "combine", "mj", "stiffness", "weigh"]
@@ -44,8 +44,8 @@ class Geoms:
             if asset is not None and len(apart[place]) == len(numbers):
                 raise ValueError(
                     f"geom {name!r} meets no other of geoms, and its contacts with all others are switched off: name the"
-                    " geoms that it may touch, such as {'floor': None}, which takes the shape of a plane, box, sphere or"
-                    " capsule from the model"
+                    " geoms that it may touch, such as {'floor': None}, which takes the shape of a plane, box, sphere,"
+                    " capsule or cylinder from the model"
                 )
         self.moves = model.body_weldid[model.geom_bodyid[self.ids]] != 0
         """[N] whether a geom can move"""
@@ -154,7 +154,9 @@ def _placed(model: mj.MjModel, number: int, name: str, asset: Asset | None) -> P
         return Placed(Sphere(size[0]), 1.0, *identity)
     if kind == mj.mjtGeom.mjGEOM_CAPSULE:
         return Placed(Capsule(size[1], size[0]), 1.0, *identity)
-    raise ValueError(f"geom {name!r} is a {_word(kind)}; without an asset, expected a plane, box, sphere or capsule")
+    if kind == mj.mjtGeom.mjGEOM_CYLINDER:
+        return Placed(Cylinder(size[1], size[0]), 1.0, *identity)
+    raise ValueError(f"geom {name!r} is a {_word(kind)}; without an asset, expected a plane, box, sphere, capsule or cylinder")
 
 
 def _word(kind: mj.mjtGeom) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypedDict, Union
 from . import _native
 from .contacts import Contacts
 from .reports import Clearance, Impact, WhyReport
-from .shapes import Box, Capsule, Plane, Sphere
+from .shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -37,7 +37,7 @@ class HasVertex(Protocol):
 
 HasMesh = Union[HasVertices, HasPoints, HasVertex]
 Mesh = Union["_native.Asset", str, "PathLike[str]", tuple["npt.ArrayLike", "npt.ArrayLike"], HasMesh]
-Shape = Union["_native.Asset", Plane, Box, Sphere, Capsule]
+Shape = Union["_native.Asset", Plane, Box, Sphere, Capsule, Cylinder]
 Body = Union[Shape, Mesh]
 
 
@@ -73,7 +73,7 @@ def collide(
 ) -> Contacts:
     """The contacts of two bodies, as the instances 0 and 1. As `tesdf collide A B`.
 
-    A body is a `Plane`, `Box`, `Sphere` or `Capsule`, or a mesh as `signed_distance` takes it, which is
+    A body is a `Plane`, `Box`, `Sphere`, `Capsule` or `Cylinder`, or a mesh as `signed_distance` takes it, which is
     encoded once. Its pose has seven numbers, x y z qx qy qz qw, or is a matrix [4, 4]; None is the
     identity. `Scene.detect` explains the options.
     """

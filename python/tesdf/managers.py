@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import Scene, asset_of
-from .shapes import Box, Capsule, Plane, Sphere
+from .shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 if TYPE_CHECKING:
     from .bodies import Body
@@ -87,7 +87,7 @@ class CollisionManager:
 
     def add_object(self, name: str, mesh: Body, transform: npt.ArrayLike | None = None) -> None:
         """Adds a body, or replaces the one of this name."""
-        shape = mesh if isinstance(mesh, (Plane, Box, Sphere, Capsule)) else asset_of(mesh)
+        shape = mesh if isinstance(mesh, (Plane, Box, Sphere, Capsule, Cylinder)) else asset_of(mesh)
         added = self._scene.add(self._scene.add_shape(shape), transform)
         if name in self._bodies:
             self.remove_object(name)
@@ -224,6 +224,9 @@ def _bounds(shape: Any) -> _Array:
         return np.array([[-np.inf] * 3, [np.inf] * 3])
     if isinstance(shape, Box):
         return np.array([-1, 1])[:, None] * np.asarray(shape.half_extents)
+    if isinstance(shape, Cylinder):
+        high = np.array([shape.radius, shape.radius, shape.half_height])
+        return np.stack([-high, high])
     if isinstance(shape, (Sphere, Capsule)):
         high = shape.radius + np.array([0, 0, shape.half_height if isinstance(shape, Capsule) else 0])
         return np.stack([-high, high])

@@ -31,7 +31,7 @@ class Contacts:
     """Finds the contacts between geoms of a model, and gives them to MuJoCo's solver.
 
     geoms: for the names of mesh geoms, the assets that were encoded from the files of their meshes.
-    A geom that is a plane, box, sphere or capsule gets None in place of an asset. Contacts are
+    A geom that is a plane, box, sphere, capsule or cylinder gets None in place of an asset. Contacts are
     found between two geoms of which at least one has an asset. For geoms with an asset, MuJoCo's own
     contacts are switched off (contype = conaffinity = 0), so name all geoms that they may touch.
     As in MuJoCo, no contacts are found within a body, between a body and its parent (other than the

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from . import _native
-from .shapes import Box, Capsule, Plane, Sphere
+from .shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 _GEOMETRY = ("asset", "mesh", "shape")
 
@@ -52,7 +52,7 @@ def _body(k: int, body: Any, memory: _Memory) -> Any:
         if value is None or isinstance(value, (str, os.PathLike, Mapping)):
             continue
         del body[key]
-        if isinstance(value, (Plane, Box, Sphere, Capsule)):
+        if isinstance(value, (Plane, Box, Sphere, Capsule, Cylinder)):
             body["shape"] = _shape(value)
         elif isinstance(value, _native.Asset):
             body["asset"] = memory.name(id(value), value, lambda: value)
@@ -70,14 +70,15 @@ def _body(k: int, body: Any, memory: _Memory) -> Any:
     return body
 
 
-def _shape(shape: Plane | Box | Sphere | Capsule) -> Any:
+def _shape(shape: Plane | Box | Sphere | Capsule | Cylinder) -> Any:
     if isinstance(shape, Plane):
         return "plane"
     if isinstance(shape, Box):
         return {"box": {"half_extents": shape.half_extents}}
     if isinstance(shape, Sphere):
         return {"sphere": {"radius": shape.radius}}
-    return {"capsule": {"half_height": shape.half_height, "radius": shape.radius}}
+    kind = "capsule" if isinstance(shape, Capsule) else "cylinder"
+    return {kind: {"half_height": shape.half_height, "radius": shape.radius}}
 
 
 def _plain(value: Any) -> Any:

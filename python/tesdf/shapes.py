@@ -33,3 +33,12 @@ class Capsule:
     half_height: float
     """half of the length of the segment"""
     radius: float
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """All points within `radius` of the z axis, between -`half_height` and `half_height`."""
+
+    half_height: float
+    """half of the length"""
+    radius: float

@@ -208,6 +208,7 @@ fn key(shape: &Shape) -> (u8, [u64; 3]) {
         Shape::Box { half_extents } => (2, half_extents.to_array().map(f64::to_bits)),
         Shape::Sphere { radius } => (3, [radius.to_bits(), 0, 0]),
         Shape::Capsule { half_height, radius } => (4, [half_height.to_bits(), radius.to_bits(), 0]),
+        Shape::Cylinder { half_height, radius } => (5, [half_height.to_bits(), radius.to_bits(), 0]),
     }
 }
 
@@ -222,6 +223,7 @@ fn mesh_of(shape: &Shape) -> Mesh {
         Shape::Box { half_extents } => simple::cuboid(*half_extents),
         Shape::Sphere { radius } => simple::capsule(0.0, *radius),
         Shape::Capsule { half_height, radius } => simple::capsule(*half_height, *radius),
+        Shape::Cylinder { half_height, radius } => simple::cylinder(*half_height, *radius),
         Shape::Plane => Mesh::default(),
     }
 }

@@ -65,6 +65,28 @@ pub fn capsule(half_height: f64, radius: f64) -> Mesh {
     mesh
 }
 
+/// A cylinder along z, centred on the origin.
+pub fn cylinder(half_height: f64, radius: f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    let directions = (0..MERIDIANS).map(|k| DVec2::from_angle(f64::from(k) / f64::from(MERIDIANS) * TAU));
+    for direction in directions {
+        for z in [-half_height, half_height] {
+            let p = (radius * direction).extend(z).as_vec3();
+            mesh.vertex(p, direction.extend(0.0).as_vec3());
+            mesh.vertex(p, (z.signum() * DVec3::Z).as_vec3());
+        }
+    }
+    let [low, high] = [-1.0, 1.0]
+        .map(|sign| mesh.vertex((sign * half_height * DVec3::Z).as_vec3(), (sign * DVec3::Z).as_vec3()));
+    for k in 0..MERIDIANS {
+        let [a, b] = [k, (k + 1) % MERIDIANS].map(|k| 4 * k);
+        mesh.quad([a, b, b + 2, a + 2]);
+        mesh.indices.extend([low, b + 1, a + 1]);
+        mesh.indices.extend([high, a + 3, b + 3]);
+    }
+    mesh
+}
+
 /// A floor in the plane z = 0: its light and its dark squares of edge `square`, around the origin.
 /// `phase` is the position of the origin in the pattern, in which squares begin at multiples of
 /// their edge.
@@ -141,6 +163,9 @@ mod tests {
         let (volume, area) = measure(&capsule(3.0, 2.0));
         near(volume, 32.0 / 3.0 * pi + 24.0 * pi, 0.01);
         near(area, 16.0 * pi + 24.0 * pi, 0.01);
+        let (volume, area) = measure(&cylinder(3.0, 2.0));
+        near(volume, 24.0 * pi, 0.01);
+        near(area, 24.0 * pi + 8.0 * pi, 0.01);
         let [light, dark] = floor(DVec2::new(0.3, 12.7), 0.1, 1.0).map(|mesh| measure(&mesh).1);
         near(light + dark, pi * FLOOR * FLOOR, 0.05);
         near(light, dark, 0.05);

@@ -17,7 +17,7 @@ use crate::record::Record;
 /// faces of each shape against the distance field of the other.
 ///
 /// It answers pairs of a [`TesdfShape`](crate::TesdfShape) with another `TesdfShape`, a half space,
-/// a cuboid, a ball or a capsule. All other pairs are `Unsupported`; [`query_dispatcher`] passes
+/// a cuboid, a ball, a capsule or a cylinder. All other pairs are `Unsupported`; [`query_dispatcher`] passes
 /// them to parry. Distances and sweeps are also `Unsupported`, and parry cannot compute them for
 /// these shapes either. Rapier's continuous collision detection therefore has no effect on them;
 /// speculative contacts take its place.

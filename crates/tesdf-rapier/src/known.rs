@@ -1,6 +1,6 @@
 //! Converts shapes of parry to shapes of the detector.
 use glam::{DQuat, DVec3};
-use rapier3d_f64::geometry::{Shape as ParryShape, TypedShape};
+use rapier3d_f64::geometry::{Cylinder, Shape as ParryShape, TypedShape};
 use rapier3d_f64::math::Pose as ParryPose;
 use tesdf::collide::{Pose, Shape};
 
@@ -11,12 +11,12 @@ pub struct Known {
     pub shape: Shape,
     pub scale: f64,
     /// Pose of the detector's frame in parry's frame. A plane of the detector faces z, and a
-    /// capsule lies along z.
+    /// capsule or cylinder lies along z.
     pub pose: Pose,
 }
 
 impl Known {
-    /// Converts an encoded mesh, half space, cuboid, ball or capsule. Returns `None` for other
+    /// Converts an encoded mesh, half space, cuboid, ball, capsule or cylinder. Returns `None` for other
     /// shapes.
     pub fn new(shape: &dyn ParryShape) -> Option<Self> {
         if let Some(mesh) = shape.as_shape::<TesdfShape>() {
@@ -41,6 +41,10 @@ impl Known {
                     half_height => Shape::Capsule { half_height, radius },
                 };
                 (shape, 0.5 * (segment.a + segment.b), rotation_to(axis.normalize_or(DVec3::Z)))
+            }
+            TypedShape::Cylinder(cylinder) => {
+                let Cylinder { half_height, radius } = *cylinder;
+                (Shape::Cylinder { half_height, radius }, DVec3::ZERO, rotation_to(DVec3::Y))
             }
             _ => return None,
         };

@@ -1,13 +1,13 @@
 //! The bodies of a system in Rapier.
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use rapier3d_f64::dynamics::{CoefficientCombineRule, RigidBody, RigidBodyBuilder, RigidBodyHandle};
 use rapier3d_f64::geometry::{
-    Capsule, Collider, ColliderBuilder, ColliderHandle, Cuboid, HalfSpace, SharedShape, SolverFlags,
+    Capsule, Collider, ColliderBuilder, ColliderHandle, Cuboid, Cylinder, HalfSpace, SharedShape, SolverFlags,
 };
 use rapier3d_f64::parry::mass_properties::MassProperties;
 use rapier3d_f64::parry::shape::Ball;
 use rapier3d_f64::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWorld};
-use tesdf::collide::{CollideError, CollideOptions, Instance, Shape};
+use tesdf::collide::{CollideError, CollideOptions, Instance, Pose, Shape};
 use tesdf_sim::{Body, Mass, State, System, Wrench};
 
 use crate::known::{parry_pose, pose};
@@ -38,9 +38,12 @@ impl World {
         let mut handles = Vec::with_capacity(system.bodies().len());
         for (number, (body, state)) in system.bodies().iter().zip(system.states()).enumerate() {
             let instance = system.scene().instance(body.instance)?;
-            let shape = shape(system.scene().shape(instance.shape)?, instance);
+            let shape = system.scene().shape(instance.shape)?;
+            let (shape, frame) = (parry_shape(shape, instance), frame(shape));
             let handle = rapier.insert_body(rigid_body(number, body, state, options));
-            rapier.insert_collider(collider(shape, body.friction), Some(handle));
+            let mut collider = collider(shape, body.friction);
+            collider.set_position_wrt_parent(parry_pose(frame));
+            rapier.insert_collider(collider, Some(handle));
             handles.push(handle);
         }
         let mut world = Self { rapier, handles, prediction };
@@ -126,7 +129,14 @@ fn collider(shape: SharedShape, friction: f64) -> Collider {
         .build()
 }
 
-fn shape(shape: &Shape, instance: &Instance) -> SharedShape {
+/// The pose of parry's shape in the frame of a shape: a cylinder of parry lies along y.
+fn frame(shape: &Shape) -> Pose {
+    let is_cylinder = matches!(shape, Shape::Cylinder { .. });
+    let rotation = if is_cylinder { DQuat::from_rotation_arc(DVec3::Y, DVec3::Z) } else { DQuat::IDENTITY };
+    Pose { rotation, ..Pose::IDENTITY }
+}
+
+fn parry_shape(shape: &Shape, instance: &Instance) -> SharedShape {
     let scale = instance.scale;
     match *shape {
         Shape::Mesh(ref asset) => match TesdfShape::scaled(asset.clone(), scale) {
@@ -140,6 +150,9 @@ fn shape(shape: &Shape, instance: &Instance) -> SharedShape {
         Shape::Capsule { half_height, radius } => {
             let end = DVec3::Z * half_height * scale;
             SharedShape::new(Capsule::new(-end, end, radius * scale))
+        }
+        Shape::Cylinder { half_height, radius } => {
+            SharedShape::new(Cylinder::new(half_height * scale, radius * scale))
         }
     }
 }

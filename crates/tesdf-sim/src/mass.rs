@@ -104,6 +104,11 @@ impl MassProperties {
                 let mass = 4.0 / 3.0 * PI * r.powi(3);
                 Self::on_axes(mass, DVec3::splat(0.4 * mass * r * r))
             }
+            Shape::Cylinder { half_height: l, radius: r } => {
+                let mass = 2.0 * PI * r * r * l;
+                let across = mass * (r * r / 4.0 + l * l / 3.0);
+                Self::on_axes(mass, DVec3::new(across, across, mass * r * r / 2.0))
+            }
             Shape::Capsule { half_height: l, radius: r } => {
                 let (cylinder, sphere) = (2.0 * PI * r * r * l, 4.0 / 3.0 * PI * r.powi(3));
                 let along = cylinder * r * r / 2.0 + sphere * 0.4 * r * r;
@@ -281,11 +286,13 @@ mod tests {
     }
 
     #[test]
-    fn masses_of_spheres_and_capsules_equal_sums_over_slices() {
+    fn masses_of_round_shapes_equal_sums_over_slices() {
         let (half_height, radius): (f64, f64) = (1.3, 0.7);
         let capsule = MassProperties::of_shape(&Shape::Capsule { half_height, radius }, 1.0, 1.0).unwrap();
         let profile = |z: f64| (radius.powi(2) - (z.abs() - half_height).max(0.0).powi(2)).sqrt();
         assert_close(&capsule, &revolved(profile, half_height + radius), 1e-8);
+        let cylinder = MassProperties::of_shape(&Shape::Cylinder { half_height, radius }, 1.0, 1.0).unwrap();
+        assert_close(&cylinder, &revolved(|_| radius, half_height), 1e-8);
         let sphere = MassProperties::of_shape(&Shape::Sphere { radius }, 1.0, 1.0).unwrap();
         assert_close(&sphere, &revolved(|z| (radius * radius - z * z).sqrt(), radius), 1e-8);
     }

@@ -13,12 +13,12 @@ use crate::terminal::report::Failure;
 pub enum BodyName {
     /// A .tesdf file.
     File(PathBuf),
-    /// A plane, box, sphere or capsule.
+    /// A plane, box, sphere, capsule or cylinder.
     Simple(Shape),
 }
 
-/// Parses `plane`, `box:HX,HY,HZ`, `sphere:R` or `capsule:HALF_HEIGHT,R`. Any other text is the
-/// name of a file.
+/// Parses `plane`, `box:HX,HY,HZ`, `sphere:R`, `capsule:HALF_HEIGHT,R` or
+/// `cylinder:HALF_HEIGHT,R`. Any other text is the name of a file.
 ///
 /// # Errors
 /// The message names the number at fault.
@@ -35,6 +35,10 @@ pub fn body_name(text: &str) -> Result<BodyName, String> {
         Some(("capsule", sizes)) => {
             let [half_height, radius] = parse::numbers(sizes, "two, capsule:HALF_HEIGHT,R")?;
             Shape::Capsule { half_height, radius }
+        }
+        Some(("cylinder", sizes)) => {
+            let [half_height, radius] = parse::numbers(sizes, "two, cylinder:HALF_HEIGHT,R")?;
+            Shape::Cylinder { half_height, radius }
         }
         _ => return Ok(BodyName::File(text.into())),
     };
@@ -73,6 +77,7 @@ mod tests {
         assert_eq!(simple("plane"), "Plane");
         assert_eq!(simple("sphere:0.5"), "Sphere { radius: 0.5 }");
         assert_eq!(simple("capsule:2 1"), "Capsule { half_height: 2.0, radius: 1.0 }");
+        assert_eq!(simple("cylinder:2,1"), "Cylinder { half_height: 2.0, radius: 1.0 }");
         assert_eq!(simple("box:1,2,3"), "Box { half_extents: DVec3(1.0, 2.0, 3.0) }");
         assert_eq!(simple("a/b.tesdf"), "Ok(File(\"a/b.tesdf\"))");
         assert_eq!(body_name("box:1,2").unwrap_err(), "2 numbers; expected three, box:HX,HY,HZ");

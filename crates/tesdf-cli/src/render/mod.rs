@@ -51,7 +51,8 @@ pub enum RenderError {
 /// Arguments of `tesdf render`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// A .tesdf file, or plane, box:HX,HY,HZ, sphere:R, capsule:HALF_HEIGHT,R
+    /// A .tesdf file, or plane, box:HX,HY,HZ, sphere:R, capsule:HALF_HEIGHT,R,
+    /// cylinder:HALF_HEIGHT,R
     #[arg(required_unless_present = "run", value_name = "BODY", value_parser = body_name)]
     pub bodies: Vec<BodyName>,
     /// Draw the bodies of this run, which `tesdf simulate` wrote

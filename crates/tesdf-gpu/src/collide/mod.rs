@@ -199,7 +199,7 @@ impl Detector {
         if self.shapes.have_moved() && (all || !pairs.is_empty()) {
             let what = match all {
                 true => "contacts per face or minimum in the mode `face`",
-                false => "contacts of open meshes and of faces with the inside in front of them",
+                false => "contacts of cylinders, open meshes and faces with the inside in front of them",
             };
             return Err(GpuError::Unavailable {
                 what: format!("{what}, while vertices have moved on the device"),

@@ -39,7 +39,11 @@ pub fn has_undetected(scene: &Scene) -> bool {
 
 /// Whether kernels find the contacts of a shape.
 pub fn is_detected(shape: &Shape) -> bool {
-    !matches!(shape, Shape::Mesh(asset) if !asset.is_detected_on_devices())
+    match shape {
+        Shape::Mesh(asset) => asset.is_detected_on_devices(),
+        Shape::Cylinder { .. } => false,
+        _ => true,
+    }
 }
 
 /// The place of the contacts of two instances in the order of all.

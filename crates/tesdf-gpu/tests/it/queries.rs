@@ -106,6 +106,7 @@ fn points_times_instances() {
                 Shape::Capsule { half_height, radius } => {
                     (local - DVec3::Z * local.z.clamp(-half_height, *half_height)).length() - radius
                 }
+                Shape::Cylinder { .. } => unreachable!("none was uploaded"),
                 Shape::Box { half_extents } => {
                     let q = local.abs() - *half_extents;
                     q.max(DVec3::ZERO).length() + q.max_element().min(0.0)

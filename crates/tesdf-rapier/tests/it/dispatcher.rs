@@ -122,10 +122,15 @@ fn simple_shapes_touch_meshes_where_they_are() {
     let gap = 5e-5;
     let capsule = Capsule::new(Vector::new(0.0, 0.002, 0.0), Vector::new(0.004, 0.002, 0.0), 0.003);
     let half_space = HalfSpace::new(Vector::X);
-    let cases: [(&dyn Shape, Pose); 4] = [
+    let cylinder = Cylinder::new(0.002, 0.003);
+    let upright = Rotation::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let cases: [(&dyn Shape, Pose); 6] = [
         (&Ball::new(0.004), Pose::from_translation(Vector::Z * (HALF + 0.004 + gap))),
         (&Cuboid::new(Vector::splat(0.002)), Pose::from_translation(Vector::Z * (HALF + 0.002 + gap))),
         (&capsule, Pose::from_translation(Vector::Z * (HALF + 0.003 + gap))),
+        // A cylinder of Rapier lies along y.
+        (&cylinder, Pose::from_translation(Vector::Z * (HALF + 0.003 + gap))),
+        (&cylinder, Pose::from_parts(Vector::Z * (HALF + 0.002 + gap), upright)),
         // The outward normal points down to the cube.
         (
             &half_space,

@@ -1,6 +1,4 @@
 //! Masses of geometries, for descriptions that leave them to the density.
-use std::f64::consts::PI;
-
 use glam::{DMat3, DVec3};
 use tesdf::collide::{Pose, Shape};
 use tesdf::input;
@@ -24,11 +22,8 @@ pub(super) fn of_density_one(Collision { pose, geometry }: &Collision) -> Result
         &Geometry::Capsule { half_height, radius } => {
             MassProperties::of_shape(&Shape::Capsule { half_height, radius }, 1.0, 1.0).map_err(told)?
         }
-        &Geometry::Cylinder { half_height: h, radius: r } => {
-            let mass = 2.0 * PI * r * r * h;
-            let across = mass * (r * r / 4.0 + h * h / 3.0);
-            let inertia = DMat3::from_diagonal(DVec3::new(across, across, 0.5 * mass * r * r));
-            MassProperties::new(mass, DVec3::ZERO, inertia).map_err(told)?
+        &Geometry::Cylinder { half_height, radius } => {
+            MassProperties::of_shape(&Shape::Cylinder { half_height, radius }, 1.0, 1.0).map_err(told)?
         }
         Geometry::Mesh { file, scale } => {
             input::check_regular(file).map_err(|e| format!("{}: {e}", file.display()))?;

@@ -344,6 +344,7 @@ impl ShapeSection {
             Self::Box { half_extents } => Shape::Box { half_extents: DVec3::from_array(half_extents) },
             Self::Sphere { radius } => Shape::Sphere { radius },
             Self::Capsule { half_height, radius } => Shape::Capsule { half_height, radius },
+            Self::Cylinder { half_height, radius } => Shape::Cylinder { half_height, radius },
         }
     }
 }

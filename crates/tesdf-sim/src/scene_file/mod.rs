@@ -8,7 +8,7 @@
 //!
 //! [[bodies]]
 //! name = "floor"
-//! shape = "plane"              # or { box = { half_extents = [x, y, z] } }, sphere, capsule
+//! shape = "plane"              # or { box = { half_extents = [x, y, z] } }, sphere, capsule, cylinder
 //! fixed = true
 //!
 //! [[bodies]]
@@ -404,6 +404,13 @@ pub enum ShapeSection {
     /// A capsule: the points within `radius` of a segment of the z axis, centred on the origin.
     Capsule {
         /// Half of the segment's length, m.
+        half_height: f64,
+        /// Radius, m.
+        radius: f64,
+    },
+    /// A cylinder about the z axis, centred on the origin.
+    Cylinder {
+        /// Half of its length, m.
         half_height: f64,
         /// Radius, m.
         radius: f64,

@@ -15,6 +15,7 @@ mod contacts_per_face;
 mod contacts_spread;
 mod container;
 mod cosine_filter;
+mod cylinders;
 mod deepest_penetration;
 mod deformation;
 mod degenerate_faces;

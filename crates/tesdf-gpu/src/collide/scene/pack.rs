@@ -55,6 +55,9 @@ impl Packed {
             Shape::Capsule { half_height, radius } => {
                 sizes(layout::ROUND, DVec3::new(*half_height, *radius, 0.0));
             }
+            Shape::Cylinder { .. } => {
+                return Err("a cylinder, which kernels do not have; the processor finds its contacts".into());
+            }
         }
         row[layout::DIAGONAL as usize] = bounded(shape.diagonal()).to_bits();
         row[layout::FANS as usize] = layout::NONE;

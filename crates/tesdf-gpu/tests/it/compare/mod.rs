@@ -5,7 +5,7 @@ use tesdf::collide::{
     CollideOptions, Contact, Contacts, ContactsPer, InstanceId, Mode, Scene, Shape, detect, why,
 };
 use tesdf::geometry::Triangle;
-use tesdf::glam::DVec3;
+use tesdf::glam::{DVec2, DVec3};
 use tesdf_gpu::{Detector, DetectorOptions, Device};
 
 /// Largest error of `f32`, relative to the larger body: rounding of poses, faces and distances.
@@ -42,6 +42,10 @@ pub fn exact(shape: &Shape, p: DVec3) -> f64 {
         Shape::Sphere { radius } => p.length() - radius,
         Shape::Capsule { half_height, radius } => {
             (p - DVec3::Z * p.z.clamp(-half_height, *half_height)).length() - radius
+        }
+        Shape::Cylinder { half_height, radius } => {
+            let q = DVec2::new(p.truncate().length() - radius, p.z.abs() - half_height);
+            q.max(DVec2::ZERO).length() + q.max_element().min(0.0)
         }
         Shape::Box { half_extents } => {
             let q = p.abs() - *half_extents;

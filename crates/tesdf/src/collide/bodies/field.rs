@@ -20,7 +20,7 @@ use crate::query::{Faces, ON_SURFACE_F64, Place, Precision, Surroundings};
 pub enum Field<'a> {
     /// The field of an encoded mesh.
     Mesh(&'a TeSdf),
-    /// The field of a plane, box, sphere or capsule.
+    /// The field of a simple shape.
     Simple(Simple),
 }
 

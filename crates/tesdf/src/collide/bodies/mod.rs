@@ -5,4 +5,6 @@ pub mod field;
 pub mod jump;
 pub mod polygon;
 pub mod reach;
+pub mod round_side;
 pub mod surface;
+pub mod turned;

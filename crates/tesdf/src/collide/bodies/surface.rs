@@ -7,7 +7,10 @@ use crate::asset::layout::TreeChild;
 use crate::collide::bodies::branch::Branch;
 use crate::collide::bodies::field::{Field, FieldBody};
 use crate::collide::bodies::reach::Reach;
+use crate::collide::bodies::round_side::RoundSide;
+use crate::collide::bodies::turned::turn;
 use crate::collide::mode::Mode;
+use crate::collide::scene::cylinder::Cylinder;
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
 use crate::collide::scene::simple::{Points, Simple, plane_square};
@@ -93,7 +96,20 @@ impl<'a> SurfaceBody<'a> {
         } else {
             0.0
         };
+        let linear = match *shape {
+            Shape::Cylinder { half_height, radius } => {
+                linear * turn(&Cylinder { half_height, radius }, linear, shift, &field.field)
+            }
+            _ => linear,
+        };
         Self { shape, linear, shift, scale: unit, around: own + field.half_thickness() }
+    }
+
+    /// The round side of a cylinder, which its faces are inside of.
+    pub fn round_side(&self) -> Option<RoundSide> {
+        let Shape::Cylinder { radius, .. } = *self.shape else { return None };
+        let axis = self.linear.z_axis.normalize_or_zero();
+        Some(RoundSide { center: self.shift, axis, radius: radius * self.scale })
     }
 
     /// How far the surfaces lie from the faces and the field's zero, in the field's frame.
@@ -500,6 +516,9 @@ impl FieldBody<'_> {
             Field::Simple(Simple::Box(half)) => Aabb { min: -half, max: half },
             Field::Simple(Simple::Round { half_height, radius }) => {
                 return (DVec3::ZERO, half_height + radius);
+            }
+            Field::Simple(Simple::Cylinder(Cylinder { half_height, radius })) => {
+                return (DVec3::ZERO, half_height.hypot(radius));
             }
             Field::Simple(Simple::Plane) => return (DVec3::ZERO, f64::INFINITY),
         };

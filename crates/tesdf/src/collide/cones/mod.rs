@@ -17,6 +17,7 @@ use glam::DVec3;
 use crate::collide::bodies::field::ROUNDING;
 use crate::collide::mode::ContactsPer;
 use crate::collide::report::contact::Contact;
+use crate::collide::scene::cylinder::Cylinder;
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
 use crate::collide::scene::shape::least_and_most;
@@ -257,7 +258,7 @@ impl Body<'_> {
         let limit = place.limit / self.placement.scale;
         let rotation = self.placement.pose.rotation;
         let mut normals = Normals::new();
-        match self.shape {
+        match *self.shape {
             Shape::Plane => normals.push(rotation * DVec3::Z),
             Shape::Box { half_extents } => {
                 for axis in 0..3 {
@@ -267,9 +268,13 @@ impl Body<'_> {
                     }
                 }
             }
-            Shape::Mesh(asset) => {
+            Shape::Mesh(ref asset) => {
                 normals = around(asset, at, limit, place.face)?;
                 normals.iter_mut().for_each(|n| *n = rotation * *n);
+            }
+            Shape::Cylinder { half_height, radius } => {
+                let cylinder = Cylinder { half_height, radius };
+                normals.extend(cylinder.normals(at, limit)?.into_iter().map(|n| rotation * n));
             }
             Shape::Sphere { .. } | Shape::Capsule { .. } => return None,
         }

@@ -407,7 +407,7 @@ impl<'a> Patch<'a> {
                         candidates.push(Candidate { point, corner: None, taken });
                     }
                 };
-                for points in simple.parts() {
+                for points in simple.parts_against(self.facing) {
                     match points[..] {
                         [a, b, c] => self.overlay(&Triangle::new([a, b, c]), f64::INFINITY, &mut offer),
                         // The feet of the ends of a capsule's core.

@@ -5,6 +5,7 @@ mod exact;
 pub mod extremes;
 mod frank_wolfe;
 mod jump;
+mod over_cylinder;
 mod simple_shape;
 
 use glam::DVec3;

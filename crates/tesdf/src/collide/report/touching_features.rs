@@ -9,7 +9,7 @@ use crate::collide::scene::error::CollideError;
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
 use crate::collide::scene::shape::least_and_most;
-use crate::collide::scene::simple::box_node;
+use crate::collide::scene::simple::{Simple, box_node};
 use crate::geometry::Triangle;
 
 /// A point is at a vertex or an edge when it is nearer than this part of the diagonal of the larger
@@ -39,8 +39,9 @@ impl Contact {
     /// `point_a`, also where this is beside an edge by less than contacts are known.
     ///
     /// Of a box, vertices have the numbers of its nodes, edges those of their two vertices, and
-    /// faces those of its sides, 0 to 5 for −x +x −y +y −z +z, as in `face_b`. Planes, spheres and
-    /// capsules have the face 0.
+    /// faces those of its sides, 0 to 5 for −x +x −y +y −z +z, as in `face_b`. A cylinder has the
+    /// face 0 on its round side, 1 and 2 at its ends at −z and +z. Planes, spheres and capsules have
+    /// the face 0.
     ///
     /// `scene` is that of the detection, with the same poses. Contacts do not keep the answer:
     /// it costs time only where it is asked for, and no memory.
@@ -101,6 +102,7 @@ fn feature(
             expected: "a face of the body: the contact is of another scene",
         }),
         Shape::Box { half_extents } => Ok(of_box(*half_extents, at, near)),
+        Shape::Cylinder { .. } => Ok(FeatureB::Face(Simple::from(shape).value(at).position)),
         Shape::Plane | Shape::Sphere { .. } | Shape::Capsule { .. } => Ok(FeatureB::Face(0)),
     }
 }

@@ -1,4 +1,5 @@
 //! Shapes, their instances, and how these move.
+pub mod cylinder;
 pub mod error;
 pub mod field_value;
 pub mod ids;

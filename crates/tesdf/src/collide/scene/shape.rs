@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::TeSdf;
 use crate::asset::InnerBall;
+use crate::collide::scene::cylinder::Cylinder;
 use crate::collide::scene::error::CollideError;
 use crate::collide::scene::simple::Simple;
 use crate::geometry::Aabb;
@@ -37,6 +38,13 @@ pub enum Shape {
         /// Radius; positive.
         radius: f64,
     },
+    /// All points within `radius` of the z axis, between `-half_height` and `half_height`.
+    Cylinder {
+        /// Half of its length; positive.
+        half_height: f64,
+        /// Radius; positive.
+        radius: f64,
+    },
 }
 
 impl Shape {
@@ -54,6 +62,11 @@ impl Shape {
             Self::Sphere { radius } => ("sphere", format!("radius {radius}"), positive(radius)),
             Self::Capsule { half_height, radius } => (
                 "capsule",
+                format!("half height {half_height}, radius {radius}"),
+                positive(half_height) && positive(radius),
+            ),
+            Self::Cylinder { half_height, radius } => (
+                "cylinder",
                 format!("half height {half_height}, radius {radius}"),
                 positive(half_height) && positive(radius),
             ),
@@ -89,8 +102,9 @@ impl Shape {
 
     /// The parts that represent the surface of a simple shape in tests: convex polygons of one to
     /// three points, and a radius. The surface lies within the radius of the polygons. A box has
-    /// twelve triangles, a capsule its segment, a sphere its centre. Meshes and planes have faces
-    /// of their own, so their list is empty.
+    /// twelve triangles, a capsule its segment, a sphere its centre, and a cylinder a prism with 32
+    /// sides, whose edges are on it. Meshes and planes have faces of their own, so their list is
+    /// empty.
     pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
         match self {
             Self::Mesh(_) | Self::Plane => (Vec::new(), 0.0),
@@ -133,6 +147,7 @@ impl From<&Shape> for Simple {
             Shape::Box { half_extents } => Self::Box(half_extents),
             Shape::Sphere { radius } => Self::Round { half_height: 0.0, radius },
             Shape::Capsule { half_height, radius } => Self::Round { half_height, radius },
+            Shape::Cylinder { half_height, radius } => Self::Cylinder(Cylinder { half_height, radius }),
             Shape::Mesh(_) => Self::Round { half_height: 0.0, radius: 0.0 },
         }
     }

@@ -47,7 +47,7 @@ impl Shape {
         Some(ShapeHit { t: ray.total(t)?, normal, face: None })
     }
 
-    /// The parameters at which the line enters and leaves a box, sphere or capsule.
+    /// The parameters at which the line enters and leaves a shape.
     fn inside_of_line(&self, from: DVec3, along: DVec3) -> Option<[f64; 2]> {
         match *self {
             Self::Mesh(_) | Self::Plane => None,
@@ -57,13 +57,15 @@ impl Shape {
             Self::Sphere { radius } => {
                 quadratic(along.length_squared(), from.dot(along), from.length_squared() - radius * radius)
             }
+            Self::Cylinder { half_height, radius } => {
+                let (f, a): (DVec2, DVec2) = (from.truncate(), along.truncate());
+                let round = quadratic(a.length_squared(), f.dot(a), f.length_squared() - radius * radius)?;
+                common(round, slab(from.z, along.z, -half_height, half_height)?)
+            }
             Self::Capsule { half_height, radius } => {
                 let ends = [-half_height, half_height]
                     .map(|z| Self::Sphere { radius }.inside_of_line(from - DVec3::new(0.0, 0.0, z), along));
-                let (f, a): (DVec2, DVec2) = (from.truncate(), along.truncate());
-                let round = quadratic(a.length_squared(), f.dot(a), f.length_squared() - radius * radius);
-                let flat = slab(from.z, along.z, -half_height, half_height);
-                let barrel = round.zip(flat).and_then(|(r, f)| common(r, f));
+                let barrel = Self::Cylinder { half_height, radius }.inside_of_line(from, along);
                 ends.into_iter().chain([barrel]).flatten().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
             }
         }
@@ -77,6 +79,13 @@ impl Shape {
                 let q = p.abs() - half_extents;
                 let axis = DVec3::AXES[(0..3).fold(0, |best, a| if q[a] > q[best] { a } else { best })];
                 axis * p.dot(axis).signum()
+            }
+            Self::Cylinder { half_height, radius } => {
+                let beside = p.with_z(0.0);
+                match p.z.abs() - half_height > beside.length() - radius {
+                    true => DVec3::Z * p.z.signum(),
+                    false => beside.normalize_or(DVec3::X),
+                }
             }
             Self::Sphere { .. } => p.normalize_or(DVec3::Z),
             Self::Capsule { half_height, .. } => {
@@ -123,6 +132,7 @@ mod tests {
             Shape::Box { half_extents: DVec3::new(0.5, 1.0, 0.25) },
             Shape::Sphere { radius: 0.7 },
             Shape::Capsule { half_height: 0.6, radius: 0.3 },
+            Shape::Cylinder { half_height: 0.6, radius: 0.4 },
         ] {
             for _ in 0..2000 {
                 let mut vector = || DVec3::from_array(std::array::from_fn(|_| random.between(-1.0, 1.0)));

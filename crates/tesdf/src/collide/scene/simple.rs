@@ -1,7 +1,8 @@
-//! Planes, boxes, spheres and capsules: their fields as formulas, and the parts of their surfaces.
+//! Planes, boxes, spheres, capsules and cylinders: their fields as formulas, and the parts of their surfaces.
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
+use crate::collide::scene::cylinder::{Cylinder, FACES_PER_SECTOR, SECTORS};
 use crate::collide::scene::field_value::FieldValue;
 use crate::geometry::{Aabb, Feature};
 
@@ -20,15 +21,18 @@ pub enum Simple {
         /// Radius.
         radius: f64,
     },
+    /// A cylinder about the z axis.
+    Cylinder(Cylinder),
 }
 
 impl Simple {
     /// Signed distance, gradient and nearest point. The sides of a box are numbered −x +x −y +y −z
-    /// +z.
+    /// +z, those of a cylinder 0 for the round one, 1 and 2 for its ends at −z and +z.
     pub fn value(&self, p: DVec3) -> FieldValue {
         let (distance, gradient, closest_point, position) = match *self {
             Self::Plane => (p.z, DVec3::Z, p.with_z(0.0), 0),
             Self::Box(half) => box_value(p, half),
+            Self::Cylinder(cylinder) => cylinder.value(p),
             Self::Round { half_height, radius } => {
                 let core = DVec3::new(0.0, 0.0, p.z.clamp(-half_height, half_height));
                 let from_core = p - core;
@@ -41,13 +45,15 @@ impl Simple {
         FieldValue { distance, gradient, closest_point, position, feature: Feature::Face }
     }
 
-    /// As `value` at `p`. Inside a box, where several sides are equally near, up to `tie`, the
-    /// gradient is that which most opposes `normal`.
+    /// As `value` at `p`. Inside a box or cylinder, where several sides are equally near, up to
+    /// `tie`, the gradient is that which most opposes `normal`.
     pub fn most_opposing(&self, p: DVec3, normal: DVec3, tie: f64, value: FieldValue) -> FieldValue {
-        let Self::Box(half) = *self else { return value };
-        if value.distance > 0.0 {
-            return value;
-        }
+        let half = match *self {
+            _ if value.distance > 0.0 => return value,
+            Self::Cylinder(cylinder) => return cylinder.most_opposing(p, normal, tie, value),
+            Self::Box(half) => half,
+            Self::Plane | Self::Round { .. } => return value,
+        };
         let tie = tie.max(1e-12 * half.max_element());
         let mut best = value;
         for axis in 0..3 {
@@ -71,6 +77,7 @@ impl Simple {
             }
             Self::Box(half) => half,
             Self::Round { half_height, radius } => DVec3::new(radius, radius, half_height + radius),
+            Self::Cylinder(Cylinder { half_height, radius }) => DVec3::new(radius, radius, half_height),
         };
         Aabb { min: -half, max: half }
     }
@@ -82,6 +89,7 @@ impl Simple {
             Self::Plane => None,
             Self::Box(half) => Some(half.min_element()),
             Self::Round { radius, .. } => Some(radius),
+            Self::Cylinder(Cylinder { half_height, radius }) => Some(half_height.min(radius)),
         }
     }
 
@@ -89,12 +97,14 @@ impl Simple {
     /// lies within the [`radius`](Self::radius) of them.
     ///
     /// A box has twelve triangles, two for each side in the order of [`value`](Self::value). A
-    /// sphere has its centre, a capsule its segment. A plane has no corners; see [`plane_square`].
+    /// sphere has its centre, a capsule its segment. A cylinder has the faces of a prism, which are
+    /// inside its round side. A plane has no corners; see [`plane_square`].
     pub fn part_count(&self) -> u32 {
         match self {
             Self::Plane => 0,
             Self::Box(_) => TRIANGLES.len() as u32,
             Self::Round { .. } => 1,
+            Self::Cylinder(_) => SECTORS * FACES_PER_SECTOR,
         }
     }
 
@@ -105,6 +115,7 @@ impl Simple {
             Self::Plane => Points::new(),
             Self::Box(half) => Points::from(TRIANGLES[part as usize].map(|corner| box_corner(half, corner))),
             Self::Round { .. } => self.nodes().map(|(end, _)| end).collect(),
+            Self::Cylinder(cylinder) => Points::from(cylinder.face(part)),
         }
     }
 
@@ -112,6 +123,22 @@ impl Simple {
     pub fn parts(&self) -> impl Iterator<Item = Points> {
         let simple = *self;
         (0..self.part_count()).map(move |part| simple.part(part))
+    }
+
+    /// The parts, with an edge of the prism of a cylinder on the side against `normal`: what is
+    /// lowest over a plane with this normal is then on them.
+    pub fn parts_against(&self, normal: DVec3) -> impl Iterator<Item = Points> {
+        let down = -normal.truncate();
+        let turn = match self {
+            Self::Cylinder(_) => down.try_normalize(),
+            _ => None,
+        };
+        self.parts().map(move |mut points| {
+            if let Some(turn) = turn {
+                points.iter_mut().for_each(|p| *p = turn.rotate(p.truncate()).extend(p.z));
+            }
+            points
+        })
     }
 
     /// The surface lies within this distance of the parts.
@@ -125,6 +152,7 @@ impl Simple {
             Self::Plane => 0,
             Self::Box(_) => NODES.len() as u32,
             Self::Round { half_height, .. } => 1 + u32::from(half_height != 0.0),
+            Self::Cylinder(_) => 2 * SECTORS + 2,
         }
     }
 
@@ -137,12 +165,17 @@ impl Simple {
             Self::Round { half_height, .. } => {
                 DVec3::new(0.0, 0.0, if node == 0 { -half_height } else { half_height })
             }
+            Self::Cylinder(cylinder) => cylinder.node(node),
         }
     }
 
     /// The lowest part that has a node.
     pub fn part_of_node(&self, node: u32) -> u32 {
-        if let Self::Box(_) = self { NODES[node as usize].1 } else { 0 }
+        match self {
+            Self::Box(_) => NODES[node as usize].1,
+            Self::Cylinder(_) => Cylinder::face_of_node(node),
+            Self::Plane | Self::Round { .. } => 0,
+        }
     }
 
     /// The distinct points of the parts, each with the lowest part that has it.

@@ -3,7 +3,7 @@ use crate::asset::layout::TreeChild;
 use crate::collide::bodies::branch::Branch;
 use crate::collide::bodies::field::FieldBody;
 use crate::collide::bodies::surface::SurfaceBody;
-use crate::collide::search::piece::{Looks, Lowest, Piece, Rest};
+use crate::collide::search::piece::{FLAT, Looks, Lowest, Piece, Rest};
 use crate::collide::search::queue::Queue;
 use crate::parallel::*;
 
@@ -96,7 +96,10 @@ pub struct Below {
 
 struct Search<'a> {
     orders: &'a [Order<'a>],
+    /// The share of the tolerance that is left for the search, and that by which surfaces may be lower
+    /// than their pieces.
     tolerance: f64,
+    beside: f64,
     /// Only signed distances below this are wanted.
     below: f64,
     /// The lowest signed distance, in the world's unit, its order and its point.
@@ -109,7 +112,10 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(orders: &'a [Order<'a>], tolerance: f64, below: f64) -> Self {
-        Self { orders, tolerance, below, best: None, open: Queue::new(), waiting: Vec::new() }
+        let is_round = orders.iter().any(|order| order.surface.round_side().is_some());
+        let beside = if is_round { FLAT * tolerance } else { 0.0 };
+        let tolerance = tolerance - beside;
+        Self { orders, tolerance, beside, below, best: None, open: Queue::new(), waiting: Vec::new() }
     }
 
     /// Searches at most this number of parts.
@@ -149,7 +155,7 @@ impl<'a> Search<'a> {
             found.into_iter().for_each(|found| self.take(found));
         }
         let within = self.least() - self.tolerance;
-        let (lower_bound, converged) = (bound.min(within), bound >= within);
+        let (lower_bound, converged) = (bound.min(within) - self.beside, bound >= within);
         let least = self.best.map(|(distance, order, lowest)| Least {
             order,
             distance,
@@ -218,7 +224,7 @@ impl<'a> Search<'a> {
         if let TreeChild::Leaf(start, count) = child {
             for face in start..start + count {
                 let part = surface.face(face, field, 0.0);
-                looks.first(Piece::new(face, &part), f64::NEG_INFINITY);
+                looks.first(Piece::new(surface, face, &part), f64::NEG_INFINITY);
             }
         }
         let lowest = looks.lowest;
@@ -246,7 +252,7 @@ impl<'a> Search<'a> {
             Item::Tree(TreeChild::Leaf(start, count)) => {
                 for face in start..start + count {
                     let part = surface.face(face, field, 0.0);
-                    rest(looks.first(Piece::new(face, &part), bound));
+                    rest(looks.first(Piece::new(surface, face, &part), bound));
                 }
             }
             Item::Piece(piece) => rest(looks.look(*piece, bound)),

@@ -5,7 +5,8 @@ use crate::TeSdf;
 use crate::collide::bodies::field::{Field, FieldBody, ROUNDING};
 use crate::collide::bodies::jump;
 use crate::collide::bodies::polygon::{Parts, Polygon};
-use crate::collide::bodies::surface::Part;
+use crate::collide::bodies::round_side::RoundSide;
+use crate::collide::bodies::surface::{Part, SurfaceBody};
 use crate::collide::scene::field_value::FieldValue;
 use crate::collide::search::depth_bounds::{Bound, DepthBounds, Kind};
 use crate::collide::search::longest_edge::longest_edge;
@@ -25,6 +26,18 @@ pub struct Piece {
     /// Whether the whole piece is known to be inside.
     is_inside: bool,
     bounds: DepthBounds,
+    /// The round side that the piece stands for, if any.
+    bulge: Option<Bulge>,
+}
+
+/// A piece of which corners are on a round side. What is between them there lies beside the piece.
+#[derive(Clone, Debug)]
+struct Bulge {
+    round: RoundSide,
+    /// Which corners are on it.
+    is_on: [bool; 3],
+    /// The surface lies within this distance of the piece.
+    height: f64,
 }
 
 /// What a piece has become by a look at it.
@@ -87,6 +100,8 @@ pub struct Looks<'a> {
     pub lowest: Option<Lowest>,
 }
 
+/// A bulge that is lower than this share of the tolerance is left out.
+pub const FLAT: f64 = 0.25;
 /// Number of places of one piece that are looked at before it is divided.
 const ROUNDS: usize = 8;
 /// A piece that crosses up to this number of faces is cut along one of them. Others are halved.
@@ -102,17 +117,87 @@ const COARSE: f64 = 1e-4;
 /// their computed distance is rarely 0 but about 1e-17.
 const CLEAR: f64 = 1e-9;
 
+impl Bulge {
+    fn new(round: RoundSide, is_on: [bool; 3], corners: [DVec3; 3]) -> Option<Self> {
+        let chord = EDGES.iter().filter(|&&(k, l)| is_on[k] && is_on[l]);
+        let chord = chord.map(|&(k, l)| round.chord(corners[k], corners[l])).fold(0.0, f64::max);
+        // Between places that differ by an angle α, at most 1 - cos(α / 2), or α² / 8, of the radius.
+        // Pieces span less than 0.2, where α is at most 1.002 times its chord.
+        let height = 1.01 * chord * chord / (8.0 * round.radius);
+        (height > 0.0).then_some(Self { round, is_on, height })
+    }
+}
+
+/// The corners of the edges of a triangle.
+const EDGES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
+
 impl Piece {
-    /// A whole face.
-    pub fn new(face: u32, part: &Part) -> Self {
-        Self::of_points(face, part.points(), part.normal, part.radius)
+    /// A whole face of a surface.
+    pub fn new(surface: &SurfaceBody, face: u32, part: &Part) -> Self {
+        let piece = Self::of_points(face, part.points(), part.normal, part.radius);
+        let bulge = surface.round_side().and_then(|round| {
+            // Only the middles of the ends are on the axis.
+            let is_on = piece.corners.map(|p| round.beside(p).length() > 0.5 * round.radius);
+            Bulge::new(round, is_on, piece.corners)
+        });
+        Self { bulge, ..piece }
     }
 
     /// One to three points of a face that the surface lies within `radius` of.
     pub fn of_points(face: u32, points: &[DVec3], normal: DVec3, radius: f64) -> Self {
         let corners = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
         let bounds = DepthBounds::NONE;
-        Self { face, radius, corners, count: points.len(), normal, is_inside: false, bounds }
+        Self { face, radius, corners, count: points.len(), normal, is_inside: false, bounds, bulge: None }
+    }
+
+    /// How far the surface may lie from the piece, or from within the radius of it.
+    fn bulge(&self) -> f64 {
+        self.bulge.as_ref().map_or(0.0, |bulge| bulge.height)
+    }
+
+    /// The point of the surface that a point of the piece stands for.
+    fn on_surface(&self, p: DVec3) -> DVec3 {
+        match &self.bulge {
+            // What is on an end is on the surface.
+            Some(Bulge { round, is_on: [true, true, true], .. }) => round.nearest(p),
+            _ => p,
+        }
+    }
+
+    /// The halves of a piece that stands for a part of a round side. The middle of a side between
+    /// two corners on it is on it, too. `is_flat` tells whether only the bulge is too high.
+    fn halves_of_bulge(&self, field: &FieldBody, bulge: &Bulge, is_flat: bool) -> Vec<Self> {
+        let Bulge { round, is_on, .. } = bulge;
+        let length = |&(k, l): &(usize, usize)| match is_flat {
+            true if is_on[k] && is_on[l] => round.chord(self.corners[k], self.corners[l]),
+            true => 0.0,
+            false => self.corners[k].distance(self.corners[l]),
+        };
+        let longest = EDGES.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
+        let &(k, l) = longest.unwrap_or(&EDGES[0]);
+        let is_on_round = is_on[k] && is_on[l];
+        let middle = 0.5 * (self.corners[k] + self.corners[l]);
+        let middle = if is_on_round { round.nearest(middle) } else { middle };
+        [l, k]
+            .map(|moved| {
+                let mut half = Self { bounds: DepthBounds::NONE, ..self.clone() };
+                half.corners[moved] = middle;
+                let mut is_on = *is_on;
+                is_on[moved] = is_on_round;
+                half.bulge = Bulge::new(*round, is_on, half.corners);
+                for bound in self.bounds.iter() {
+                    if let Some(triangle) = triangle(field, bound.face) {
+                        half.bounds.add(chord(bound.face, &triangle, half.corners));
+                    }
+                }
+                half
+            })
+            .into()
+    }
+
+    /// No point of the surface is deeper, by the bounds.
+    fn deepest(&self) -> f64 {
+        self.bounds.greatest + self.radius + self.bulge()
     }
 
     fn points(&self) -> &[DVec3] {
@@ -246,7 +331,7 @@ impl Looks<'_> {
 
     /// The first look at a whole face, none of whose points is below the bound.
     pub fn first(&mut self, mut piece: Piece, bound: f64) -> Rest {
-        let center = piece.center();
+        let center = piece.on_surface(piece.center());
         let (value, lower) = self.value(&piece, center, false);
         let bound = bound.max(self.by_reach(&piece, center, &value, lower));
         if self.is_closed(bound) {
@@ -255,13 +340,16 @@ impl Looks<'_> {
         if self.is_deep(&piece) {
             self.add_bound(&mut piece, center, &value);
         }
-        let bound = bound.max(-piece.bounds.greatest - piece.radius);
+        let bound = bound.max(-piece.deepest());
         if self.is_closed(bound) { Rest::Nothing } else { Rest::Pieces(bound, vec![piece]) }
     }
 
     /// Looks at a piece where it can be lowest, and divides it when it can still be lower than all
     /// others.
     pub fn look(&mut self, mut piece: Piece, mut bound: f64) -> Rest {
+        if piece.bulge() <= FLAT * self.tolerance {
+            piece.bulge = None;
+        }
         if !self.is_deep(&piece) {
             // The distance outside matters, too.
             match self.side(&piece) {
@@ -272,19 +360,19 @@ impl Looks<'_> {
         }
         let mut plane = None;
         for _ in 0..ROUNDS {
-            bound = bound.max(-piece.bounds.greatest - piece.radius);
+            bound = bound.max(-piece.deepest());
             if self.is_closed(bound) {
                 return Rest::Nothing;
             }
-            let at = piece.point(piece.bounds.at);
-            let is_fine = -self.least - piece.radius + COARSE > piece.bounds.greatest;
+            let at = piece.on_surface(piece.point(piece.bounds.at));
+            let is_fine = -self.least + COARSE > piece.deepest();
             let (value, lower) = self.value(&piece, at, is_fine);
             bound = bound.max(self.by_reach(&piece, at, &value, lower));
             if self.is_closed(bound) {
                 return Rest::Nothing;
             }
             let progress = self.add_bound(&mut piece, at, &value);
-            bound = bound.max(-piece.bounds.greatest - piece.radius);
+            bound = bound.max(-piece.deepest());
             if self.is_closed(bound) {
                 return Rest::Nothing;
             }
@@ -310,7 +398,7 @@ impl Looks<'_> {
     /// Lower bound of the signed distances of the surface on a piece, by the value at a point and
     /// the bound `lower` there.
     fn by_reach(&self, piece: &Piece, at: DVec3, value: &FieldValue, lower: f64) -> f64 {
-        let (field, reach) = (self.field, piece.reach(at));
+        let (field, reach) = (self.field, piece.reach(at) + piece.bulge());
         match field.jump() {
             None => (lower - reach).max(field.lowest() - piece.radius),
             Some(_) => {
@@ -323,12 +411,16 @@ impl Looks<'_> {
     /// The parts of a piece that can still be lower than all others. The piece is cut along a
     /// plane, or halved.
     fn divided(&self, piece: &Piece, bound: f64, plane: Option<Plane>) -> Rest {
+        if let Some(bulge) = &piece.bulge {
+            let is_flat = self.is_closed(bound + bulge.height);
+            return Rest::Pieces(bound, piece.halves_of_bulge(self.field, bulge, is_flat));
+        }
         let cut = match (plane, self.field.field) {
             (Some(plane), Field::Mesh(asset)) => piece.cut(asset, plane),
             _ => None,
         };
         let mut parts = cut.unwrap_or_else(|| piece.halves(self.field, self.hair()));
-        parts.retain(|part| !self.is_closed(bound.max(-part.bounds.greatest - part.radius)));
+        parts.retain(|part| !self.is_closed(bound.max(-part.deepest())));
         if parts.is_empty() { Rest::Nothing } else { Rest::Pieces(bound, parts) }
     }
 
@@ -463,7 +555,7 @@ impl Looks<'_> {
     /// candidate.
     fn side(&mut self, piece: &Piece) -> Side {
         let Field::Mesh(asset) = self.field.field else { return Side::Inside };
-        let (points, normal, clear) = (piece.points(), piece.normal, self.hair());
+        let (points, normal, clear) = (piece.points(), piece.normal, self.hair() + piece.bulge());
         let outer = (self.least + piece.radius).min(self.limit + piece.radius).max(0.0) + 2.0 * clear;
         let mut nearest = (outer, None);
         let (mut crossed, mut deepest) = (0, (clear, None));
@@ -487,7 +579,12 @@ impl Looks<'_> {
             if crossed > FEW { f64::NEG_INFINITY } else { nearest.0.max(2.0 * clear) }
         });
         if let (Some(at), true) = (nearest.1, self.least + piece.radius >= 0.0) {
+            let at = piece.on_surface(at);
             self.offer(piece, at, &self.field.exact_value(at));
+        }
+        if piece.bulge.is_some() && nearest.0 < outer {
+            // The surface beside the piece may be lower, or on the other side.
+            return Side::Across(None);
         }
         if crossed > 0 {
             return Side::Across(deepest.1.filter(|_| crossed <= FEW));

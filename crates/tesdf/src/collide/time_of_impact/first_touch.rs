@@ -72,7 +72,7 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
         let pair = PairAt { bodies: [bodies[0].at(time), bodies[1].at(time)], radius, time };
         let places = [0, 1].map(|k| pair.bodies[k].part(parts[k]));
         let found = pair.parting(&places, limits.kept);
-        let are_faces = matches!(parts, [MovingPart::Face(_), MovingPart::Face(_)]);
+        let are_faces = parts.iter().all(MovingPart::is_face);
         if are_faces && found.distance <= limits.touching {
             return end(Outcome::Touch(time));
         }
@@ -90,9 +90,9 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
             open.push(next, Open { parts, steps: steps + 1 });
             return ControlFlow::Continue(());
         }
-        let is_first = match parts {
-            [MovingPart::Face(_), _] => false,
-            [_, MovingPart::Face(_)] => true,
+        let is_first = match parts.map(|part| part.is_face()) {
+            [true, _] => false,
+            [_, true] => true,
             _ => places[0].reach() >= places[1].reach(),
         };
         let next = next.max(time);

@@ -1,4 +1,5 @@
 //! The time at which two moving bodies first touch.
+mod cylinder_part;
 mod first_touch;
 mod moving;
 mod parting;

@@ -3,10 +3,12 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::asset::layout::TreeChild;
 use crate::collide::clearance::Body;
+use crate::collide::scene::cylinder::Cylinder;
 use crate::collide::scene::error::CollideError;
 use crate::collide::scene::motion::{Motion, Twist};
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
+use crate::collide::time_of_impact::cylinder_part::CylinderPart;
 use crate::geometry::Triangle;
 
 /// A part of a surface.
@@ -18,6 +20,19 @@ pub enum MovingPart {
     Half { node: u32, side: u8 },
     /// A face of a mesh, or a part of a simple shape.
     Face(u32),
+    /// A part of a cylinder.
+    OfCylinder(CylinderPart),
+}
+
+impl MovingPart {
+    /// Whether it is flat and has no parts.
+    pub fn is_face(&self) -> bool {
+        match self {
+            Self::Whole | Self::Half { .. } => false,
+            Self::Face(_) => true,
+            Self::OfCylinder(part) => part.is_face(),
+        }
+    }
 }
 
 /// A body in motion. Lengths are in the world's unit; places are seen from an origin that the two
@@ -56,6 +71,7 @@ impl<'a> MovingBody<'a> {
             Shape::Mesh(asset) => (Vec::new(), asset.half_thickness * asset.frame.inverse_scale()),
             // A plane is the half-space of a direction, so one of its points stands for it.
             Shape::Plane => (vec![vec![DVec3::ZERO]], 0.0),
+            Shape::Cylinder { radius, .. } => (Vec::new(), radius * CylinderPart::BESIDE),
             shape => shape.parts(),
         };
         Ok(Self { shape, placement, motion, origin, twist, simple, radius: radius * placement.scale })
@@ -84,6 +100,12 @@ impl<'a> MovingBody<'a> {
                 }
             }
             (Shape::Mesh(_), MovingPart::Whole) => 0,
+            (Shape::Cylinder { .. }, MovingPart::Whole) => {
+                return CylinderPart::all().into_iter().map(MovingPart::OfCylinder).collect();
+            }
+            (_, MovingPart::OfCylinder(part)) => {
+                return part.parts().into_iter().map(MovingPart::OfCylinder).collect();
+            }
             _ => return (0..self.simple.len() as u32).map(MovingPart::Face).collect(),
         };
         vec![MovingPart::Half { node, side: 0 }, MovingPart::Half { node, side: 1 }]
@@ -148,6 +170,16 @@ impl BodyAt<'_> {
             (Shape::Mesh(asset), MovingPart::Whole) => {
                 let bounds = asset.bounds();
                 of_box(bounds.min, bounds.max)
+            }
+            (&Shape::Cylinder { half_height, radius }, MovingPart::OfCylinder(part)) => {
+                let cylinder = Cylinder { half_height, radius };
+                if part.is_face() {
+                    of_face(&part.corners(&cylinder))
+                } else {
+                    let (center, halves) = part.bounds(&cylinder);
+                    let halves = halves.map(|half| self.linear * half);
+                    PartAt { center: self.place(center), extent: Extent::Box { halves } }
+                }
             }
             (_, MovingPart::Face(face)) => of_face(&self.body.simple[face as usize]),
             (shape, _) => {
