@@ -3,6 +3,7 @@ mod analytic;
 mod bin_picking;
 mod chain;
 mod couplings;
+mod cylinders;
 mod deep;
 mod forces;
 mod friction;

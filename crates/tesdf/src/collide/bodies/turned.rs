@@ -15,9 +15,27 @@ const STEPS: usize = 4;
 const HALVINGS: usize = 32;
 
 /// The turn about the z axis of a cylinder whose points p are at `linear` · p + `shift` of a field.
-/// Over a mesh there is none: the faces of the mesh find the lowest places.
 pub fn turn(cylinder: &Cylinder, linear: DMat3, shift: DVec3, field: &Field) -> DMat3 {
-    let Field::Simple(simple) = *field else { return DMat3::IDENTITY };
+    let direction = match field {
+        Field::Simple(simple) => lowest_direction(cylinder, linear, shift, simple),
+        Field::Mesh(_) => direction_from_axis(cylinder, linear, shift, field),
+    };
+    let DVec2 { x, y } = direction;
+    DMat3::from_cols(DVec3::new(x, y, 0.0), DVec3::new(-y, x, 0.0), DVec3::Z)
+}
+
+/// The direction from the axis to the nearest surface of a mesh: from the lowest of its middle and its
+/// ends. Where the cylinder touches it elsewhere, too, the faces of the mesh find the lowest places.
+fn direction_from_axis(cylinder: &Cylinder, linear: DMat3, shift: DVec3, field: &Field) -> DVec2 {
+    let on_axis = [0.0, -cylinder.half_height, cylinder.half_height];
+    let values = on_axis.map(|z| field.rough_value(linear * DVec3::new(0.0, 0.0, z) + shift).0);
+    let lowest = values.iter().min_by(|a, b| a.distance.total_cmp(&b.distance));
+    let down = lowest.map(|value| -(linear.transpose() * value.gradient).truncate());
+    down.and_then(|down| down.try_normalize()).unwrap_or(DVec2::X)
+}
+
+/// The direction from the axis in which the surface is lowest in the field of a simple shape.
+fn lowest_direction(cylinder: &Cylinder, linear: DMat3, shift: DVec3, simple: &Simple) -> DVec2 {
     let Cylinder { half_height, radius } = *cylinder;
     let value = |p: DVec3| simple.value(linear * p + shift);
     let lowest_at = |beside: DVec2| {
@@ -49,6 +67,5 @@ pub fn turn(cylinder: &Cylinder, linear: DMat3, shift: DVec3, field: &Field) -> 
         }
         at = (radius * direction).extend(0.0);
     }
-    let DVec2 { x, y } = best.1;
-    DMat3::from_cols(DVec3::new(x, y, 0.0), DVec3::new(-y, x, 0.0), DVec3::Z)
+    best.1
 }

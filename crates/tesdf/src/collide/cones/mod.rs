@@ -23,7 +23,7 @@ use crate::collide::scene::shape::Shape;
 use crate::collide::scene::shape::least_and_most;
 use crate::query::Precision;
 use around::around;
-use cone::{Cone, Normals, PARALLEL, SAME, clamped, common, crossing, is_near, least_cosine};
+use cone::{Cone, Normals, PARALLEL, SAME, SLOPE, clamped, common, crossing, is_near, least_cosine};
 pub use elsewhere::{in_cones, keep_different};
 
 /// The limits of the rule, for kernels on other devices.
@@ -37,6 +37,10 @@ pub mod limits {
 /// and of the larger body. The search knows a place to its tolerance.
 const OF_SMALLER: f64 = 1e-6;
 const OF_LARGER: f64 = 2e-7;
+
+/// Of the prism of a cylinder, a place this far from its edge, in radii, is not on the round side, and
+/// 1 less the cosine of the angle to the lowest place.
+const OFF_ROUND: f64 = 1e-5;
 
 /// The normal cones of two bodies, in the world.
 #[derive(Clone, Copy, Debug)]
@@ -113,6 +117,9 @@ impl<'a> Cones<'a> {
     fn of(&self, contact: Contact, faces: [u32; 2]) -> Option<Contact> {
         let keep = Some(contact);
         let Contact { point_a, point_b, distance, normal, .. } = contact;
+        if self.is_beside_lowest(&contact) {
+            return None;
+        }
         let Some(of_a) = self.a.normals(&Place { at: point_a, limit: self.near, face: faces[0] }) else {
             return keep;
         };
@@ -187,6 +194,20 @@ impl<'a> Cones<'a> {
                 }
             }
         }
+    }
+
+    /// Whether a contact of the prism of a cylinder in the field of a mesh is beside the place where
+    /// the round side touches, which the faces of the mesh find. As a plane, a contact ahead of it
+    /// would stop the cylinder from turning.
+    fn is_beside_lowest(&self, contact: &Contact) -> bool {
+        let (Shape::Cylinder { radius, .. }, Shape::Mesh(_)) = (self.a.shape, self.b.shape) else {
+            return false;
+        };
+        let Placement { pose, scale } = self.a.placement;
+        let axis = pose.rotation * DVec3::Z;
+        let beside = (contact.point_a - pose.translation).reject_from_normalized(axis) / (scale * radius);
+        let is_of_round_side = contact.normal.dot(axis).abs() < SLOPE && beside.length() > 1.0 - OFF_ROUND;
+        is_of_round_side && beside.normalize_or_zero().dot(-contact.normal) < 1.0 - OFF_ROUND
     }
 
     /// The normal of two faces that lie flush on each other, as far as bodies turn in a step. That
