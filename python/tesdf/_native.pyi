@@ -330,8 +330,8 @@ class Asset:
 class Scene:
     def __new__(cls) -> Scene: ...
     def add_shape(self, shape: Body) -> int:
-        """Adds a shape: an Asset, which the scene shares, a Plane, Box, Sphere or Capsule. Returns its
-        id."""
+        """Adds a shape: an Asset, which the scene shares, a Plane, Box, Sphere, Capsule or Cylinder.
+        Returns its id."""
     def remove_shape(self, shape: int) -> None:
         """Removes a shape that no instance uses."""
     def add(
@@ -506,7 +506,8 @@ class Scene:
         A point is at a vertex or an edge when it is nearer than 2e-6 of the diagonal of the larger
         body, at most 1e-4 of that of the smaller one. Vertices and faces are numbered as in the mesh;
         of a Box, faces are its sides 0 to 5 for -x +x -y +y -z +z, and vertices its nodes; a
-        Plane, Sphere or Capsule has the face 0.
+        Cylinder has the face 0 on its round side, 1 and 2 at its ends at -z and +z; a Plane, Sphere
+        or Capsule has the face 0.
 
         contacts: Contacts of Scene.detect, or the contacts of a Simulation with a scene of its
         bodies.

@@ -215,6 +215,8 @@ def test_clearance_of_simple_shapes():
     assert scene.clearance(2, 1).distance == pytest.approx(-1) and scene.clearance(2, 1).overlap
     plane = tesdf.clearance(tesdf.Capsule(half_height=1, radius=0.25), tesdf.Plane(), pose_a=[0, 0, 3, 0, 0, 0, 1])
     assert plane.distance == 1.75
+    plane = tesdf.clearance(tesdf.Cylinder(half_height=1, radius=0.25), tesdf.Plane(), pose_a=[0, 0, 3, 0, 0, 0, 1])
+    assert plane.distance == 2 and plane.point_a[2] == 2
     for a, b, text in ((0, 0, "one and the same"), (0, 9, "instance 9 is not in the scene")):
         with pytest.raises(tesdf.CollideError, match=text):
             scene.clearance(a, b)

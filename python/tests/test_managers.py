@@ -62,7 +62,8 @@ def test_distances_are_the_least_of_all_pairs():
     for k in range(30):
         pose = np.append(random.uniform(-0.3, 0.3, 3), random.normal(size=4))
         pose[3:] /= np.linalg.norm(pose[3:])
-        shape = [CUBE, tesdf.Sphere(0.01), tesdf.Capsule(0.02, 0.005), tesdf.Box((0.01, 0.02, 0.03))][k % 4]
+        round_shapes = tesdf.Sphere(0.01), tesdf.Capsule(0.02, 0.005), tesdf.Cylinder(0.02, 0.01)
+        shape = [CUBE, tesdf.Box((0.01, 0.02, 0.03)), *round_shapes][k % 5]
         bodies[f"body {k}"] = shape, pose
         manager.add_object(f"body {k}", shape, pose)
     true = {

@@ -52,6 +52,7 @@ def test_geometries_of_a_simulation_come_from_memory(cube, tmp_path):
         (tesdf.Box((0.03, 0.03, 0.03)), {"box": {"half_extents": [0.03, 0.03, 0.03]}}),
         (tesdf.Sphere(0.03), {"sphere": {"radius": 0.03}}),
         (tesdf.Capsule(0.01, 0.03), {"capsule": {"half_height": 0.01, "radius": 0.03}}),
+        (tesdf.Cylinder(0.01, 0.03), {"cylinder": {"half_height": 0.01, "radius": 0.03}}),
     ]:
         assert ends({"shape": shape, **place}) == ends({"shape": keys, **place}) != expected
 
@@ -123,5 +124,5 @@ def test_what_is_no_body_is_refused(cube):
         tesdf.Simulation(scene({"mesh": (cube[0], cube[1][:-1])}))
     with pytest.raises(tesdf.SceneError, match="more than one of asset, mesh, shape and parts"):
         tesdf.Simulation(scene({"mesh": cube, "shape": {"sphere": {"radius": 1.0}}}))
-    with pytest.raises(ValueError, match="shape: int; expected an Asset, Plane, Box, Sphere or Capsule, or a mesh"):
+    with pytest.raises(ValueError, match="shape: int; expected an Asset, Plane, Box, Sphere, Capsule or Cylinder, or a mesh"):
         tesdf.Scene().add_shape(3)

@@ -42,12 +42,13 @@ ROW = [[0, 0, 0], [1.5, 0, 0], [3, 0, 0]]
 def test_shapes_come_back(asset):
     scene = tesdf.Scene()
     shapes = [asset, tesdf.Plane(), tesdf.Box((1, 2, 3)), tesdf.Sphere(0.5), tesdf.Capsule(half_height=2, radius=1)]
-    assert [scene.add_shape(shape) for shape in shapes] == [0, 1, 2, 3, 4]
-    assert [scene.shapes[k] for k in range(1, 5)] == shapes[1:]
+    shapes.append(tesdf.Cylinder(half_height=3, radius=1))
+    assert [scene.add_shape(shape) for shape in shapes] == [0, 1, 2, 3, 4, 5]
+    assert [scene.shapes[k] for k in range(1, 6)] == shapes[1:]
     assert scene.shapes[0].to_bytes() == asset.to_bytes()
     scene.remove_shape(2)
-    assert list(scene.shapes) == [0, 1, 3, 4] and scene.add_shape(tesdf.Plane()) == 5
-    assert repr(scene) == "<tesdf.Scene: 0 instances of 5 shapes>" and len(scene) == 0
+    assert list(scene.shapes) == [0, 1, 3, 4, 5] and scene.add_shape(tesdf.Plane()) == 6
+    assert repr(scene) == "<tesdf.Scene: 0 instances of 6 shapes>" and len(scene) == 0
 
 
 def test_states_come_back():
@@ -167,7 +168,7 @@ def test_invalid_poses_are_errors(poses, error, text):
     (lambda s: s.remove_shape(0), tesdf.CollideError, "shape 0 is used by instance 0"),
     (lambda s: s.exclude([[0, 1], [0, 7]]), tesdf.CollideError, "instance 7"),
     (lambda s: s.exclude([0, 1]), ValueError, r"pairs: an array of shape \(2,\); expected shape \(P, 2\)"),
-    (lambda s: s.add_shape(17), ValueError, "shape: int; expected an Asset, Plane, Box, Sphere or Capsule, or a mesh: "),
+    (lambda s: s.add_shape(17), ValueError, "shape: int; expected an Asset, Plane, Box, Sphere, Capsule or Cylinder, or a mesh: "),
     (lambda s: s.add_shape(tesdf.Sphere(-1)), tesdf.CollideError, "sphere: radius -1; expected"),
     (lambda s: s.add_shape(tesdf.Sphere(None)), ValueError, "shape.radius: NoneType; expected a number"),
     (lambda s: s.add_shape(tesdf.Box([1, 2])), ValueError, "shape.half_extents: list; expected three numbers"),

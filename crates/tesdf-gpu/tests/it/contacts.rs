@@ -83,6 +83,7 @@ fn simple_shapes_meet_meshes_and_each_other() {
         Shape::Box { half_extents: DVec3::new(0.05, 0.08, 0.03) },
         Shape::Sphere { radius: 0.05 },
         Shape::Capsule { half_height: 0.06, radius: 0.03 },
+        Shape::Cylinder { half_height: 0.04, radius: 0.05 },
         Shape::Plane,
     ];
     let size = shapes[0].diagonal().max(shapes[1].diagonal());
