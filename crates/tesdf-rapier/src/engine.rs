@@ -40,7 +40,7 @@ impl RapierEngine {
     ///
     /// # Errors
     /// An option of `options` or `collide` is out of range, or [`DynamicsError::Unsupported`] when
-    /// the system has joints, friction of single pairs or restitution.
+    /// the system has joints, friction of single pairs, torsional friction or restitution.
     pub fn new(
         system: System,
         collide: CollideOptions,
@@ -54,6 +54,9 @@ impl RapierEngine {
         }
         if system.has_pair_friction() {
             return unsupported("friction of single pairs");
+        }
+        if system.has_friction_torsional() {
+            return unsupported("torsional friction");
         }
         if system.bodies().iter().any(|body| body.restitution > 0.0) {
             return unsupported("restitution");

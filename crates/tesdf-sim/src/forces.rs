@@ -15,6 +15,9 @@ pub struct ContactForce {
     pub normal_force: f64,
     /// The force of friction on the first body, in the world and across the normal, N.
     pub friction: DVec3,
+    /// The moment of torsional friction on the first body about the normal, N m; its opposite acts
+    /// on the second.
+    pub torque: f64,
 }
 
 impl ContactForce {
@@ -60,6 +63,7 @@ impl Forces {
         self.contacts.extend(part.contacts.iter().map(|contact| ContactForce {
             normal_force: share * contact.normal_force,
             friction: share * contact.friction,
+            torque: share * contact.torque,
             ..*contact
         }));
         for (sum, joint) in self.joints.iter_mut().zip(&part.joints) {

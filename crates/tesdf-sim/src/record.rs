@@ -22,6 +22,7 @@
 //! | `forces.ids` | `u32 [F, 2]` | bodies: the force acts on the first, its opposite on the second |
 //! | `forces.points` | `f64 [F, 3]` | where it acts, m, world frame |
 //! | `forces.contacts` | `f32 [F, 6]` | along the normal, and friction, N, world frame |
+//! | `forces.torques` | `f32 [F]` | moment of torsional friction about the normal, N m |
 //! | `forces.joints` | `f32 [Q · J, 8]` | on the child: force, N; torque, N m; what motor and couplings do |
 //!
 //! S is the number of steps, B of bodies, J of joints, R of steps with recorded contacts, C of
@@ -31,7 +32,8 @@
 //! overlap of two bodies is hidden when no contact shows it.
 //!
 //! A file without hidden overlaps has no `hidden.…` tensors, one without recorded forces no
-//! `forces.…` tensors.
+//! `forces.…` tensors. A run has `forces.torques` where bodies have torsional friction: it has the
+//! version 6, and others the version 5.
 //!
 //! The metadata has one key, `tesdf_run`. Its value is JSON with `version`, `bodies` and `joints`
 //! (names), `scene` (the scene as JSON) and `folder`, the folder that the scene's paths are
@@ -70,8 +72,11 @@ use hidden::HiddenRows;
 pub use journal::{InterruptedRun, RunJournal};
 pub use origin::RunOrigin;
 
-/// The version of complete runs and journals that this build writes and reads.
-pub const RUN_VERSION: u32 = 5;
+/// The latest version of complete runs and journals that this build writes and reads: that of runs
+/// with torsional friction.
+pub const RUN_VERSION: u32 = 6;
+/// The version of runs without torsional friction, which this build writes and reads, too.
+pub const RUN_VERSION_WITHOUT_TORQUES: u32 = 5;
 const KEY: &str = "tesdf_run";
 
 /// States of all bodies over time, and the contacts and forces of some steps.
@@ -98,6 +103,8 @@ pub struct RunRecord {
     ids: Vec<[u32; 4]>,
     hidden: HiddenRows,
     forces: ForceRows,
+    /// Whether contacts may have torques: the run has the version of these.
+    has_torques: bool,
     /// Warnings, without those of hidden overlaps.
     told: Vec<Warning>,
 }
@@ -139,11 +146,13 @@ pub enum RecordError {
     #[error("not a run of tesdf: {0}; `tesdf simulate` writes runs")]
     NotARun(String),
     /// The file has another format version.
-    #[error("the run has version {found}; this build reads {reads}: simulate the scene again")]
+    #[error(
+        "the run has version {found}; this build reads {RUN_VERSION_WITHOUT_TORQUES} and {reads}: simulate the scene again"
+    )]
     Version {
         /// The version in the file.
         found: u32,
-        /// That which this build reads.
+        /// The latest one that this build reads.
         reads: u32,
     },
     /// The run is complete, so there is nothing to resume.
@@ -191,7 +200,9 @@ impl RunRecord {
     pub fn new(system: &System, scene: serde_json::Value) -> Self {
         let bodies = system.bodies().iter().map(|body| body.name.clone()).collect();
         let joints = system.joints().iter().map(|joint| joint.name.clone()).collect();
-        let mut record = Self { bodies, joints, scene, contact_starts: vec![0], ..Self::default() };
+        let has_torques = system.has_friction_torsional();
+        let mut record =
+            Self { bodies, joints, scene, contact_starts: vec![0], has_torques, ..Self::default() };
         record.push(0.0, system);
         record
     }
@@ -202,18 +213,30 @@ impl RunRecord {
     /// [`RecordError::Version`], or a warning that cannot be.
     fn of_about(about: About) -> Result<Self, RecordError> {
         let About { version, bodies, joints, scene, folder, planned, warnings } = about;
-        if version != RUN_VERSION {
-            return Err(RecordError::Version { found: version, reads: RUN_VERSION });
-        }
+        let has_torques = has_torques(version)?;
         told::check(&warnings, &bodies).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
         let contact_starts = vec![0];
         let told = warnings;
-        Ok(Self { bodies, joints, scene, folder, planned, contact_starts, told, ..Self::default() })
+        Ok(Self {
+            bodies,
+            joints,
+            scene,
+            folder,
+            planned,
+            contact_starts,
+            has_torques,
+            told,
+            ..Self::default()
+        })
+    }
+
+    fn version(&self) -> u32 {
+        if self.has_torques { RUN_VERSION } else { RUN_VERSION_WITHOUT_TORQUES }
     }
 
     fn about(&self) -> About {
         About {
-            version: RUN_VERSION,
+            version: self.version(),
             bodies: self.bodies.clone(),
             joints: self.joints.clone(),
             scene: self.scene.clone(),
@@ -365,13 +388,16 @@ impl RunRecord {
             tensors.push(tensor("hidden.ids", Dtype::U32, vec![ids.len(), 2], ids.as_flattened())?);
             tensors.push(tensor("hidden.depths", Dtype::F64, vec![depths.len()], depths)?);
         }
-        let ForceRows { steps, ends, ids, points, contacts, joints } = &self.forces;
+        let ForceRows { steps, ends, ids, points, contacts, torques, joints } = &self.forces;
         if !steps.is_empty() {
             tensors.push(tensor("forces.steps", Dtype::U64, vec![steps.len()], steps)?);
             tensors.push(tensor("forces.ends", Dtype::U64, vec![ends.len()], ends)?);
             tensors.push(tensor("forces.ids", Dtype::U32, vec![ids.len(), 2], ids.as_flattened())?);
             tensors.push(tensor("forces.points", Dtype::F64, vec![ids.len(), 3], points.as_flattened())?);
             tensors.push(tensor("forces.contacts", Dtype::F32, vec![ids.len(), 6], contacts.as_flattened())?);
+            if self.has_torques {
+                tensors.push(tensor("forces.torques", Dtype::F32, vec![torques.len()], torques)?);
+            }
             tensors.push(tensor("forces.joints", Dtype::F32, vec![joints.len(), 8], joints.as_flattened())?);
         }
         Ok(serialize(tensors, Some(metadata))?)
@@ -426,6 +452,10 @@ impl RunRecord {
                 ids: values(&file, "forces.ids", Dtype::U32, &[2])?,
                 points: values(&file, "forces.points", Dtype::F64, &[3])?,
                 contacts: values(&file, "forces.contacts", Dtype::F32, &[6])?,
+                torques: match empty.has_torques {
+                    true => values(&file, "forces.torques", Dtype::F32, &[])?,
+                    false => vec![0.0; file.tensor("forces.ids")?.shape().first().copied().unwrap_or(0)],
+                },
                 joints: values(&file, "forces.joints", Dtype::F32, &[8])?,
             },
             Err(_) => ForceRows::default(),
@@ -467,6 +497,15 @@ impl RunRecord {
         Err(RecordError::NotARun(
             "the shapes of its tensors do not match: it was damaged or made by hand".into(),
         ))
+    }
+}
+
+/// Whether runs of this version have torques.
+fn has_torques(version: u32) -> Result<bool, RecordError> {
+    match version {
+        RUN_VERSION => Ok(true),
+        RUN_VERSION_WITHOUT_TORQUES => Ok(false),
+        found => Err(RecordError::Version { found, reads: RUN_VERSION }),
     }
 }
 

@@ -7,6 +7,8 @@ use crate::coupling::{Coupling, Couplings};
 use crate::joint::wrapped;
 use crate::{DynamicsError, Joint, JointKind, MassProperties, Motor};
 
+mod surface;
+
 /// Whether a body moves, and its mass properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mass {
@@ -29,6 +31,8 @@ pub struct Body {
     pub mass: Mass,
     /// Coefficient of friction, see [`System::friction`].
     pub friction: f64,
+    /// Coefficient of torsional friction, m, see [`System::friction_torsional`].
+    pub friction_torsional: f64,
     /// Coefficient of restitution, see [`System::restitution`].
     pub restitution: f64,
     /// Rate at which the velocity of a free body's centre of mass decays, 1/s: in a step of h
@@ -96,6 +100,8 @@ pub struct System {
     coordinates: Vec<f64>,
     /// Coefficients of friction of pairs of bodies, the lower number first.
     pair_friction: BTreeMap<(usize, usize), f64>,
+    /// Likewise of torsional friction, m.
+    pair_friction_torsional: BTreeMap<(usize, usize), f64>,
     /// Acceleration of every free body, m/s².
     pub gravity: DVec3,
 }
@@ -115,8 +121,8 @@ impl System {
     }
 
     /// Adds a body and returns its number: 0, 1, 2, … in the order of the calls. A free or
-    /// kinematic body starts with the velocity of `instance`. Its friction, restitution and
-    /// damping are 0.
+    /// kinematic body starts with the velocity of `instance`. Its coefficients of friction and
+    /// restitution and its damping are 0.
     ///
     /// # Errors
     /// The same errors as [`Scene::add`].
@@ -143,6 +149,7 @@ impl System {
             instance: id,
             mass,
             friction: 0.0,
+            friction_torsional: 0.0,
             restitution: 0.0,
             linear_damping: 0.0,
             angular_damping: 0.0,
@@ -326,42 +333,6 @@ impl System {
         Ok(())
     }
 
-    /// Sets the coefficient of friction of a body.
-    ///
-    /// # Errors
-    /// [`DynamicsError::NoBody`], or [`DynamicsError::Option`] when it is not a finite number of 0
-    /// or more.
-    pub fn set_friction(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
-        self.body(body)?;
-        self.bodies[body].friction = not_negative("friction", coefficient)?;
-        Ok(())
-    }
-
-    /// Sets the coefficient of restitution of a body.
-    ///
-    /// # Errors
-    /// [`DynamicsError::NoBody`], or [`DynamicsError::Option`] when it is not a number from 0 to 1.
-    pub fn set_restitution(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
-        self.body(body)?;
-        if !(0.0..=1.0).contains(&coefficient) {
-            let expected = "a number from 0 to 1";
-            return Err(DynamicsError::Option { option: "restitution", found: coefficient, expected });
-        }
-        self.bodies[body].restitution = coefficient;
-        Ok(())
-    }
-
-    /// The coefficient of restitution between two bodies: the geometric mean of theirs. It is the
-    /// speed at which they part over the speed at which they meet.
-    pub fn restitution(&self, a: usize, b: usize) -> f64 {
-        (self.bodies[a].restitution * self.bodies[b].restitution).sqrt()
-    }
-
-    /// Whether a body has a restitution.
-    pub(crate) fn has_restitution(&self) -> bool {
-        self.bodies.iter().any(|body| body.restitution > 0.0)
-    }
-
     /// Sets the [linear damping](Body::linear_damping) of a body, 1/s.
     ///
     /// # Errors
@@ -380,32 +351,6 @@ impl System {
         self.body(body)?;
         self.bodies[body].angular_damping = not_negative("angular_damping", damping)?;
         Ok(())
-    }
-
-    /// Sets the coefficient of friction between two bodies, in place of the one that follows from
-    /// those of the bodies.
-    ///
-    /// # Errors
-    /// The same errors as [`set_friction`](Self::set_friction).
-    pub fn set_pair_friction(&mut self, a: usize, b: usize, coefficient: f64) -> Result<(), DynamicsError> {
-        self.body(a)?;
-        self.body(b)?;
-        let coefficient = not_negative("friction", coefficient)?;
-        self.pair_friction.insert((a.min(b), a.max(b)), coefficient);
-        Ok(())
-    }
-
-    /// The coefficient of friction between two bodies: that of the pair if one was set, otherwise
-    /// the geometric mean of those of the bodies. So a body of coefficient 0 has no friction with
-    /// any other.
-    pub fn friction(&self, a: usize, b: usize) -> f64 {
-        let of_bodies = || (self.bodies[a].friction * self.bodies[b].friction).sqrt();
-        self.pair_friction.get(&(a.min(b), a.max(b))).copied().unwrap_or_else(of_bodies)
-    }
-
-    /// Whether pairs of bodies have a coefficient of their own.
-    pub fn has_pair_friction(&self) -> bool {
-        !self.pair_friction.is_empty()
     }
 
     /// Sets the wrench that acts on a body from now on. It has no effect on fixed and kinematic

@@ -194,6 +194,7 @@ impl Newton {
             let forces = compressing.iter().zip(&opening).map(|(w, u)| RowForce {
                 along: w.along + share * (u.along - w.along),
                 friction: w.friction + share * (u.friction - w.friction),
+                torsion: w.torsion + share * (u.torsion - w.torsion),
             });
             all.add(&self.reactions(&stopping, &forces.collect::<Vec<_>>(), hit.len()), 1.0);
         }

@@ -141,6 +141,17 @@ impl Newton {
         Ok(())
     }
 
+    /// Sets the coefficient of torsional friction of a body from now on, m, as
+    /// [`System::friction_torsional`] uses it. It wakes, with the bodies that it touches.
+    ///
+    /// # Errors
+    /// As [`System::set_friction`].
+    pub fn set_friction_torsional(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
+        self.system.set_friction_torsional(body, coefficient)?;
+        self.wake(body);
+        Ok(())
+    }
+
     fn begin(&self, h: f64, whole: f64) -> Step {
         let states = self.system.states();
         let mut free_of = vec![None; states.len()];

@@ -69,8 +69,8 @@ impl Found<'_> {
 /// What the contacts of two instances have in common.
 struct Pair {
     centers: [Option<Center>; 2],
-    /// Coefficient of friction.
-    friction: f64,
+    /// Coefficients of friction, and of torsional friction, m.
+    friction: [f64; 2],
     skin: f64,
     motions: [BodyMotion; 2],
     /// The gap up to which contacts get rows, m.
@@ -125,6 +125,12 @@ impl Pair {
     fn carrying(&self, point: DVec3) -> DVec3 {
         let at = |motion: &BodyMotion| if motion.is_kinematic { motion.at(point) } else { DVec3::ZERO };
         at(&self.motions[0]) - at(&self.motions[1])
+    }
+
+    /// The angular velocity of *a* relative to *b*, as far as these are kinematic, rad/s.
+    fn turning(&self) -> DVec3 {
+        let of = |motion: &BodyMotion| if motion.is_kinematic { motion.angular } else { DVec3::ZERO };
+        of(&self.motions[0]) - of(&self.motions[1])
     }
 }
 
@@ -181,6 +187,7 @@ impl<'a> Gaps<'a> {
             let carried = self.step.h * pair.carrying(contact.point_a);
             if let Some(friction) = &mut row.friction {
                 friction.way = carried.reject_from_normalized(normal);
+                friction.turn = self.step.h * pair.turning().dot(normal);
             }
             row.gap -= pair.skin;
             let slip = relative.reject_from_normalized(normal);
@@ -205,7 +212,10 @@ impl<'a> Gaps<'a> {
         (centers != [None; 2]).then(|| Pair {
             reach: reach.between(&centers),
             centers,
-            friction: self.system.friction(bodies[0], bodies[1]),
+            friction: [
+                self.system.friction(bodies[0], bodies[1]),
+                self.system.friction_torsional(bodies[0], bodies[1]),
+            ],
             skin: self.skin(bodies[0], bodies[1]),
             motions: bodies.map(|body| self.motion(body, poses)),
         })

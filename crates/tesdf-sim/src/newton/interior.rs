@@ -258,29 +258,32 @@ impl Interior<'_> {
 
     /// The limits of friction that follow from the pushes.
     fn limits(&self, forces: &[Forces]) -> Vec<Lanes> {
-        let limit = |(bundle, forces): (&Bundle, &Forces)| {
-            bundle.slip.as_ref().map_or(Lanes::ZERO, |slip| slip.coefficient * forces.push)
+        let limit = |(k, bundle): (usize, &Bundle)| {
+            let push = forces[self.lines.pushing(k)].push;
+            bundle.slip.as_ref().map_or(Lanes::ZERO, |slip| slip.coefficient * push)
         };
-        self.lines.bundles.iter().zip(forces).map(limit).collect()
+        self.lines.bundles.iter().enumerate().map(limit).collect()
     }
 
-    /// How far fixed limits of friction, where they matter, are from μ × push, as a share of all.
+    /// How far fixed limits of friction, where they matter, are from μ × push, as a share of all:
+    /// the greater one of sliding and torsional friction.
     fn lag(&self, at: &Solution) -> f64 {
-        let (mut excess, mut all) = (0.0, f64::MIN_POSITIVE);
+        let mut laws = [(0.0, f64::MIN_POSITIVE); 2];
         let limits = self.limits(&at.forces);
         for (((bundle, forces), due), limit) in
             self.lines.bundles.iter().zip(&at.forces).zip(&limits).zip(&at.limits)
         {
             let Some(slip) = &bundle.slip else { continue };
+            let (excess, all) = &mut laws[usize::from(slip.torsion.is_some())];
             for lane in 0..bundle.rows().len() {
                 let [due, limit, scale] = [due, limit, &slip.scale].map(|lanes| lanes.0[lane]);
                 let size = forces.friction[0].0[lane].hypot(forces.friction[1].0[lane]);
                 let slides = size > 0.999 * limit;
-                excess += scale * if slides { (due - limit).abs() } else { (size - due).max(0.0) };
-                all += scale * due;
+                *excess += scale * if slides { (due - limit).abs() } else { (size - due).max(0.0) };
+                *all += scale * due;
             }
         }
-        excess / all
+        laws.into_iter().map(|(excess, all)| excess / all).fold(0.0, greater)
     }
 
     /// The mean square of a gap of `gap` metres over all bounds, in the units of the rows.

@@ -26,6 +26,10 @@ const RIGID: f64 = 1e-13;
 /// this share of the smaller body. They differ where rows are from poses at different times.
 const SAME_OFFSET: f64 = 1e-9;
 
+/// A turn counts as a way at this multiple of a body's lever: so a box that torsional friction holds
+/// at nine tenths of its limit creeps by so little that it falls asleep, as one that friction holds.
+const TORSION: f64 = 2.0;
+
 /// The bodies of an island, in a step.
 #[derive(Clone, Debug)]
 pub struct Bodies {
@@ -83,8 +87,13 @@ pub struct Bundle {
 }
 
 /// Friction in units of its own, with the mean of `w` over two tangents.
+///
+/// Torsional friction is a bundle of its own, in which nothing pushes. Its first tangent is the turn
+/// about the normal, with its own `w`, and its second one is nothing.
 #[derive(Clone, Debug)]
 pub struct Slips {
+    /// `None`: sliding friction, which the pushes of its bundle limit.
+    pub torsion: Option<Torsion>,
     /// The derivatives of the ways along two tangents by the relative velocity.
     pub tangents: [[Lanes; 6]; 2],
     /// The ways when the velocities are zero.
@@ -93,6 +102,15 @@ pub struct Slips {
     pub coefficient: Lanes,
     /// k of the ways.
     pub scale: Lanes,
+}
+
+/// Whose torsional friction it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Torsion {
+    /// The number of the bundle whose pushes limit it. It comes before.
+    pub of: usize,
+    /// The length at which a turn counts as a way, m: what sticks turns by as little as others slide.
+    lever: f64,
 }
 
 /// What acts along the rows of a bundle, in their units.
@@ -118,8 +136,10 @@ struct Masses {
 #[derive(Clone, Copy)]
 struct Member {
     group: usize,
-    /// Whether it has friction.
+    /// Whether it has friction, ...
     slips: bool,
+    /// ... and torsional friction.
+    turns: bool,
     number: usize,
     /// The side whose velocity counts.
     reference: usize,
@@ -246,6 +266,13 @@ impl Placed<'_> {
     }
 }
 
+impl Member {
+    /// Of torsional friction on its body, m.
+    fn lever(&self, rows: &[Placed<'_>], bodies: &Bodies) -> f64 {
+        rows[self.number].bodies[self.reference].map_or(1.0, |body| TORSION * bodies.levers[body])
+    }
+}
+
 impl Lines {
     /// Adds those of `rows` with these numbers.
     pub fn add(&mut self, numbers: &[usize], rows: &[Placed<'_>], bodies: &Bodies, pattern: &Pattern) {
@@ -254,16 +281,35 @@ impl Lines {
             let row = &rows[number];
             let reference = row.reference(bodies);
             let group = self.group(row, reference, bodies, pattern);
-            members.push(Member { group, slips: row.row.friction.is_some(), number, reference });
+            let friction = row.row.friction.as_ref();
+            let slips = friction.is_some_and(|friction| friction.coefficient > 0.0);
+            let turns = friction.is_some_and(|friction| friction.torsional > 0.0);
+            members.push(Member { group, slips, turns, number, reference });
         }
-        members.sort_by_key(|member| (member.group, member.slips));
+        let kind = |member: &Member| (member.group, member.slips, member.turns);
+        members.sort_by_key(kind);
         self.bundles.reserve(members.len() / WIDTH + self.groups.len());
-        for batch in members.chunk_by(|a, b| (a.group, a.slips) == (b.group, b.slips)) {
-            let (first, Member { group, slips, .. }) = (self.bundles.len(), batch[0]);
+        for batch in members.chunk_by(|a, b| kind(a) == kind(b)) {
+            let (first, Member { group, slips, turns, .. }) = (self.bundles.len(), batch[0]);
             let masses = Masses::of(&self.groups[group], bodies);
             self.bundles.extend(batch.chunks(WIDTH).map(|four| Bundle::new(four, rows, &masses)));
-            self.batches.push(Batch { group, slips, bundles: first..self.bundles.len() });
+            let last = self.bundles.len();
+            self.batches.push(Batch { group, slips, bundles: first..last });
+            if turns {
+                let lever = batch[0].lever(rows, bodies);
+                for (of, four) in (first..last).zip(batch.chunks(WIDTH)) {
+                    let torsion = Torsion { of, lever };
+                    self.bundles.push(Bundle::torsional(four, rows, &masses, torsion, &self.bundles[of]));
+                }
+                self.batches.push(Batch { group, slips: true, bundles: last..self.bundles.len() });
+            }
         }
+    }
+
+    /// The number of the bundle whose pushes limit the friction of bundle `k`.
+    #[inline(always)]
+    pub fn pushing(&self, k: usize) -> usize {
+        self.bundles[k].slip.as_ref().and_then(|slip| slip.torsion).map_or(k, |torsion| torsion.of)
     }
 
     /// The group of a row.
@@ -304,6 +350,10 @@ impl Lines {
             let mut forces = Forces::default();
             for (lane, &k) in bundle.rows().iter().enumerate() {
                 let (row, force) = of_row(k);
+                if let Some(Slips { torsion: Some(torsion), scale, .. }) = &bundle.slip {
+                    forces.friction[0].0[lane] = force.torsion / (torsion.lever * scale.0[lane]);
+                    continue;
+                }
                 forces.push.0[lane] = force.along / bundle.scale.0[lane];
                 if let (Some(slip), Some(friction)) = (&bundle.slip, &row.friction) {
                     let along = tangents(friction.normal).map(|t| t.dot(force.friction) / slip.scale.0[lane]);
@@ -378,6 +428,7 @@ impl Bundle {
             let weight = masses.weight(&along[0]) + masses.weight(&along[1]);
             let of_slip = masses.scale(weight * 0.5, count);
             Slips {
+                torsion: None,
                 tangents: along.map(|[j, _]| masses.scaled(j, of_slip)),
                 way: ways.map(|way| of_slip * way),
                 coefficient: coefficient * scale / of_slip,
@@ -386,6 +437,42 @@ impl Bundle {
         });
         let normal = masses.scaled(along[0], scale);
         Self { rows: numbers, count, normal, gap, compliance, bounds, scale, slip }
+    }
+
+    /// The torsional friction of `members`, whose pushes are those of `pushes`.
+    fn torsional(
+        members: &[Member],
+        rows: &[Placed<'_>],
+        masses: &Masses,
+        torsion: Torsion,
+        pushes: &Self,
+    ) -> Self {
+        let (mut along, mut way, mut coefficient) = (Sides::default(), Lanes::ZERO, Lanes::ZERO);
+        for (lane, member) in members.iter().enumerate() {
+            let Some(friction) = &rows[member.number].row.friction else { continue };
+            for (to, side) in along.iter_mut().zip([member.reference, 1 - member.reference]) {
+                let turn = if side == 0 { friction.normal } else { -friction.normal };
+                to[3..].iter_mut().zip(turn.to_array()).for_each(|(to, value)| to.0[lane] = value);
+            }
+            way.0[lane] = friction.turn;
+            coefficient.0[lane] = friction.torsional;
+        }
+        let scale = masses.scale(masses.weight(&along), members.len());
+        let slip = Slips {
+            torsion: Some(torsion),
+            tangents: [masses.scaled(along[0], scale), [Lanes::ZERO; 6]],
+            way: [scale * way, Lanes::ZERO],
+            coefficient: coefficient * pushes.scale / scale,
+            scale: scale * torsion.lever.recip(),
+        };
+        Self {
+            normal: [Lanes::ZERO; 6],
+            gap: Lanes::ZERO,
+            bounds: [f64::NEG_INFINITY, f64::INFINITY].map(Lanes::splat),
+            scale: Lanes::splat(1.0),
+            slip: Some(slip),
+            ..pushes.clone()
+        }
     }
 
     /// The numbers of its rows.
@@ -446,8 +533,12 @@ impl Bundle {
         }
     }
 
-    /// The force of a row, N or N m.
-    pub fn to_force(&self, lane: usize, row: &Row, forces: &Forces) -> RowForce {
+    /// Puts what it does of the force of a row, N or N m. Torsional friction comes after the rest.
+    pub fn tell(&self, lane: usize, row: &Row, forces: &Forces, to: &mut RowForce) {
+        if let Some(Slips { torsion: Some(torsion), scale, .. }) = &self.slip {
+            to.torsion = torsion.lever * scale.0[lane] * forces.friction[0].0[lane];
+            return;
+        }
         let friction = match (&self.slip, &row.friction) {
             (Some(slip), Some(friction)) => {
                 let [x, y] = tangents(friction.normal);
@@ -456,7 +547,7 @@ impl Bundle {
             }
             _ => DVec3::ZERO,
         };
-        RowForce { along: forces.push.0[lane] * self.scale.0[lane], friction }
+        *to = RowForce { along: forces.push.0[lane] * self.scale.0[lane], friction, torsion: 0.0 };
     }
 }
 

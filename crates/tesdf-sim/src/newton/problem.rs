@@ -1,5 +1,4 @@
 //! The problem of one island: rows that may act, and those that a solution calls.
-use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
 use super::interior::{Interior, Solution};
@@ -129,7 +128,7 @@ impl<'a> Problem<'a> {
             iterations += found.iterations;
             for (bundle, of_bundle) in lines.bundles.iter().zip(&found.forces) {
                 for (lane, &k) in bundle.rows().iter().enumerate() {
-                    forces[k] = bundle.to_force(lane, self.rows[k].row, of_bundle);
+                    bundle.tell(lane, self.rows[k].row, of_bundle, &mut forces[k]);
                 }
             }
             let mut closed = 0.0;
@@ -143,7 +142,7 @@ impl<'a> Problem<'a> {
             }
             if closed <= CLOSED || !found.velocity.iter().all(|v| v.norm().is_finite()) {
                 for (force, placed) in forces.iter_mut().zip(&self.rows).filter(|(_, row)| is_given(row)) {
-                    *force = RowForce { along: placed.row.bounds[0], friction: DVec3::ZERO };
+                    *force = RowForce { along: placed.row.bounds[0], ..RowForce::default() };
                 }
                 let Solution { velocity, converged, residual, .. } = found;
                 return Minimum { velocity, forces, iterations, converged, residual };
@@ -171,7 +170,7 @@ fn pairs_of(placed: &Placed<'_>) -> impl Iterator<Item = (usize, usize)> {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DQuat};
+    use glam::{DMat3, DQuat, DVec3};
 
     use super::*;
     use crate::MassProperties;
@@ -216,6 +215,8 @@ mod tests {
                     normal,
                     coefficient,
                     way: (0.01 * H * vector()).reject_from_normalized(normal),
+                    torsional: 0.0,
+                    turn: 0.0,
                 }),
             }
         };
@@ -255,6 +256,9 @@ mod tests {
                 let Some((body, j)) = side else { continue };
                 let friction = sign * force.friction;
                 lack[*body] += j * (H * force.along) + pack(friction, arm.cross(friction));
+                if let Some(Friction { normal, .. }) = row.friction {
+                    lack[*body] += pack(DVec3::ZERO, sign * force.torsion * normal);
+                }
             }
             let gap = row.gap + H * row.rate(&found.velocity);
             for (body, j) in &row.coupled {
@@ -285,6 +289,15 @@ mod tests {
             if again.distance(force.friction) > 1e-9 * per_gap + LAG * limit {
                 return Err(format!("row {k}: {force:?} at a slip of {slip} m"));
             }
+            let spin = |side: usize| {
+                row.sides[side].map_or(0.0, |(body, _)| unpack(&found.velocity[body]).1.dot(friction.normal))
+            };
+            let turn = friction.turn + H * (spin(0) - spin(1));
+            let limit = friction.torsional * force.along;
+            let again = (force.torsion - per_gap * turn).clamp(-limit, limit);
+            if (again - force.torsion).abs() > 1e-9 * per_gap + LAG * limit {
+                return Err(format!("row {k}: {force:?} at a turn of {turn} rad"));
+            }
         }
         let off = lack.iter().zip(free).map(|(p, body)| H * (body.inverse * p).norm()).fold(0.0, f64::max);
         if off > 1e-8 { Err(format!("momentum is off by {off:e} m")) } else { Ok(()) }
@@ -303,6 +316,47 @@ mod tests {
             check(&free, &target, &rows, &found).unwrap_or_else(|off| panic!("seed {seed}: {off}"));
             assert!(found.forces.iter().filter(|force| force.along > 0.0).count() > 5, "seed {seed}");
         }
+    }
+
+    /// With and without sliding friction, of some contacts, and of all.
+    #[test]
+    fn torsional_friction_keeps_its_law() {
+        let mut stick = [0; 2];
+        for seed in 0..60 {
+            let random = &mut fastrand::Rng::with_seed(seed);
+            let coefficient = [0.0, 0.1, 0.2][seed as usize % 3];
+            let free = bodies([1.0, 10.0, 1e3][seed as usize / 3 % 3], random);
+            let (target, mut rows) = (velocities(random), contacts(100, coefficient, random));
+            let none = Friction {
+                normal: DVec3::ZERO,
+                coefficient: 0.0,
+                way: DVec3::ZERO,
+                torsional: 0.0,
+                turn: 0.0,
+            };
+            for (k, row) in rows.iter_mut().enumerate() {
+                if seed % 2 == 1 && k % 3 == 0 {
+                    continue;
+                }
+                let side = row.sides[0].unwrap().1;
+                let torsional = 0.1 * random.f64();
+                let turn = 0.01 * H * (random.f64() - 0.5);
+                let friction = row.friction.unwrap_or(Friction { normal: unpack(&side).0, ..none });
+                row.friction = Some(Friction { torsional, turn, ..friction });
+            }
+            let found = problem(&free, &target, &rows).minimise(target.clone(), None);
+            assert!(found.converged, "seed {seed}");
+            check(&free, &target, &rows, &found).unwrap_or_else(|off| panic!("seed {seed}: {off}"));
+            for (row, force) in rows.iter().zip(&found.forces).filter(|(_, force)| force.along > 1e-3) {
+                let Some(Friction { torsional, .. }) = row.friction else { continue };
+                if torsional > 0.0 {
+                    stick[usize::from(force.torsion.abs() < 0.99 * torsional * force.along)] += 1;
+                }
+            }
+            let again = problem(&free, &target, &rows).minimise(found.velocity.clone(), Some(&found.forces));
+            assert!(again.converged && again.iterations < 10, "seed {seed}: {}", again.iterations);
+        }
+        assert!(stick.iter().all(|&count| count > 50), "some turn and some stick: {stick:?}");
     }
 
     /// Where friction is great, some problems have no solution that the method finds.

@@ -57,7 +57,8 @@ impl Newton {
         };
         // The mean of two directions is shorter than 1.
         let (normal, normal_force) = push.normalize_and_length();
-        Some(ContactForce { bodies, point: row.point, normal, normal_force, friction: force.friction })
+        let RowForce { friction, torsion, .. } = *force;
+        Some(ContactForce { bodies, point: row.point, normal, normal_force, friction, torque: torsion })
     }
 
     /// The forces of a step in which parts have `made` these: bodies that are still in it have those

@@ -55,6 +55,8 @@ pub struct RowForce {
     pub along: f64,
     /// N
     pub friction: DVec3,
+    /// The moment of torsional friction about the normal, N m.
+    pub torsion: f64,
 }
 
 /// A condition on the velocities of two bodies: a force acts between them, along `sides`, so that
@@ -99,7 +101,8 @@ pub enum Gap {
 }
 
 /// Friction of a contact. It acts against the velocity of the first body relative to the second one
-/// in the tangent plane.
+/// in the tangent plane, and against the spin of the first one relative to the second about the
+/// normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     /// Unit normal of the tangent plane.
@@ -109,6 +112,11 @@ pub struct Friction {
     /// The way in the step that kinematic bodies add to that of the free ones, in the tangent
     /// plane, m.
     pub way: DVec3,
+    /// Coefficient of torsional friction, m.
+    pub torsional: f64,
+    /// The angle in the step that kinematic bodies add to that of the free ones about the normal,
+    /// rad.
+    pub turn: f64,
 }
 
 /// The stiffness of a spring.
@@ -171,12 +179,13 @@ impl Row {
     }
 
     /// The row of a contact between two bodies, with the contact's distance as its gap. Returns
-    /// `None` when neither body is free. It acts along `normal`, with this coefficient of friction.
+    /// `None` when neither body is free. It acts along `normal`, with these coefficients of friction
+    /// and of torsional friction.
     pub fn of_contact(
         contact: &Contact,
         normal: DVec3,
         bodies: &[Option<Center>; 2],
-        coefficient: f64,
+        [coefficient, torsional]: [f64; 2],
         stiffness: f64,
     ) -> Option<Self> {
         let side = |k: usize, direction: DVec3| {
@@ -190,7 +199,7 @@ impl Row {
         if sides == [None; 2] {
             return None;
         }
-        let friction = Friction { normal, coefficient, way: DVec3::ZERO };
+        let friction = Friction { normal, coefficient, way: DVec3::ZERO, torsional, turn: 0.0 };
         Some(Self {
             id: RowId::Contact([contact.instance_a, contact.instance_b], contact.feature.a),
             sides: sides.map(|side| side.map(|(_, side)| side)),
@@ -202,7 +211,7 @@ impl Row {
             stiffness: Stiffness::Relative(stiffness),
             bounds: PUSHES,
             resistance: Resistance::Rigid,
-            friction: (coefficient > 0.0).then_some(friction),
+            friction: (coefficient > 0.0 || torsional > 0.0).then_some(friction),
         })
     }
 }

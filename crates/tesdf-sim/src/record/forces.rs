@@ -19,6 +19,8 @@ pub(super) struct ForceRows {
     pub points: Vec<[f64; 3]>,
     /// The force along the normal, then that of friction, N, world frame.
     pub contacts: Vec<[f32; 6]>,
+    /// The moment about the normal, N m.
+    pub torques: Vec<f32>,
     /// Force on the child, N, its torque, N m, world frame, what the motor and what couplings do;
     /// for each joint of each step.
     pub joints: Vec<[f32; 8]>,
@@ -33,6 +35,7 @@ impl ForceRows {
             self.points.push(contact.point.to_array());
             let [n, f] = [contact.normal_force * contact.normal, contact.friction].map(DVec3::as_vec3);
             self.contacts.push([n.x, n.y, n.z, f.x, f.y, f.z]);
+            self.torques.push(contact.torque as f32);
         }
         self.ends.push(self.ids.len() as u64);
         for joint in &forces.joints {
@@ -63,6 +66,7 @@ impl ForceRows {
                 normal: along.normalize_or_zero(),
                 normal_force: along.length(),
                 friction,
+                torque: f64::from(self.torques[k]),
             }
         };
         let joint = |row: &[f32; 8]| JointForce {
@@ -80,7 +84,7 @@ impl ForceRows {
     /// Whether all columns match, and refer to existing steps and bodies.
     pub fn fit(&self, steps: u64, bodies: usize, joints: usize) -> bool {
         let contacts = self.ids.len();
-        [self.points.len(), self.contacts.len()] == [contacts; 2]
+        [self.points.len(), self.contacts.len(), self.torques.len()] == [contacts; 3]
             && self.ends.len() == self.steps.len()
             && self.ends.is_sorted()
             && self.ends.last().copied().unwrap_or(0) == contacts as u64
@@ -96,6 +100,7 @@ impl RunRecord {
     /// successive calls must ascend.
     pub fn push_forces(&mut self, step: u64, forces: &Forces) {
         self.forces.push(step, forces);
+        self.has_torques |= forces.contacts.iter().any(|contact| contact.torque != 0.0);
     }
 
     /// The steps with recorded forces, each with its forces, which are kept as 32-bit floats.

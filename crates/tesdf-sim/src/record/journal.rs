@@ -15,8 +15,8 @@
 //! Frame k + 1 is the state after k steps: a [`StateHead`], then poses and velocities. The contacts
 //! at the beginning of the last step follow if they are recorded: points, normals, distances and
 //! ids, in the types of the complete file. The ids and depths of the hidden overlaps at that time
-//! follow, then the forces of the last step if they are recorded: ids, points and contacts, and
-//! those of all joints. Where the `warnings` of the metadata are others than those of the frame
+//! follow, then the forces of the last step if they are recorded: ids, points and contacts, with
+//! torques in the version that has them, and those of all joints. Where the `warnings` of the metadata are others than those of the frame
 //! before, they come last, as JSON; each replaces all before.
 //!
 //! Each frame is written by one call, which does not wait for the disk. A process that is killed
@@ -29,7 +29,7 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use tesdf::save::{Destination, GrowingFile, SaveError};
 
-use super::{About, RUN_VERSION, RecordError, RunRecord, told};
+use super::{About, RecordError, RunRecord, has_torques, told};
 use crate::simulate::PartialRun;
 use crate::totals::Totals;
 use crate::{Residual, RunOrigin, StepReport, Warning};
@@ -60,6 +60,8 @@ pub struct RunJournal {
     bytes: u64,
     /// The warnings of the last frame.
     told: Vec<Warning>,
+    /// Whether frames have torques.
+    has_torques: bool,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -119,10 +121,10 @@ impl RunJournal {
         let about = About { warnings: Vec::new(), ..record.about() };
         let first = First { about, origin: origin.clone() };
         let first = serde_json::to_vec(&first).map_err(|e| RecordError::NotARun(e.to_string()))?;
-        let mut bytes = [&MAGIC[..], &RUN_VERSION.to_le_bytes()].concat();
+        let mut bytes = [&MAGIC[..], &record.version().to_le_bytes()].concat();
         bytes.extend(frame(0, &first));
-        bytes.extend(frame(1, &state(record, 0, &StepReport::default(), &[])));
-        Self::write(destination, &bytes, 2, &[])
+        bytes.extend(frame(1, &state(record, 0, &StepReport::default(), &[], record.has_torques)));
+        Self::write(destination, &bytes, 2, &[], record.has_torques)
     }
 
     /// Replaces the destination by the complete frames of an interrupted run; [`push`](Self::push)
@@ -131,8 +133,8 @@ impl RunJournal {
     /// # Errors
     /// The same errors as [`begin`](Self::begin).
     pub fn resume(destination: &Destination, earlier: &InterruptedRun) -> Result<Option<Self>, RecordError> {
-        let RunRecord { told, .. } = &earlier.run.record;
-        Self::write(destination, &earlier.bytes, 2 + earlier.run.record.steps(), told)
+        let RunRecord { told, has_torques, .. } = &earlier.run.record;
+        Self::write(destination, &earlier.bytes, 2 + earlier.run.record.steps(), told, *has_torques)
     }
 
     fn write(
@@ -140,12 +142,13 @@ impl RunJournal {
         bytes: &[u8],
         frames: u64,
         told: &[Warning],
+        has_torques: bool,
     ) -> Result<Option<Self>, RecordError> {
         let Some(mut part) = destination.part()? else { return Ok(None) };
         let path = destination.path().to_path_buf();
         part.write_all(bytes).map_err(|source| failed(&path, source))?;
         let (file, bytes, told) = (part.finish()?, bytes.len() as u64, told.to_vec());
-        Ok(Some(Self { file, path, frames, bytes, told }))
+        Ok(Some(Self { file, path, frames, bytes, told, has_torques }))
     }
 
     /// Appends the last state of `record` and the report of the step that led to it.
@@ -157,7 +160,8 @@ impl RunJournal {
             true => Vec::new(),
             false => serde_json::to_vec(&record.told).map_err(|e| RecordError::NotARun(e.to_string()))?,
         };
-        let frame = frame(self.frames, &state(record, record.steps() as usize, report, &told));
+        let state = state(record, record.steps() as usize, report, &told, self.has_torques);
+        let frame = frame(self.frames, &state);
         self.file.write_all(&frame).map_err(|source| {
             // Readers skip an incomplete frame, but a full disk may need its space.
             let _ = self.file.cut(self.bytes);
@@ -195,11 +199,8 @@ impl InterruptedRun {
     /// frame are dropped.
     pub(super) fn from_bytes(mut bytes: Vec<u8>) -> Result<Self, RecordError> {
         let version = bytes.get(MAGIC.len()..HEAD).and_then(|version| version.try_into().ok());
-        match version.map(u32::from_le_bytes) {
-            Some(RUN_VERSION) => {}
-            Some(found) => return Err(RecordError::Version { found, reads: RUN_VERSION }),
-            None => return Err(RecordError::NotARun(NO_STATE.into())),
-        }
+        let version = version.map(u32::from_le_bytes).ok_or_else(|| RecordError::NotARun(NO_STATE.into()))?;
+        has_torques(version)?;
         let mut frames = Frames { bytes: &bytes, at: HEAD, number: 0 };
         let first = frames.next().ok_or_else(|| RecordError::NotARun(NO_STATE.into()))?;
         let First { about, origin } = serde_json::from_slice(first)
@@ -265,7 +266,7 @@ fn checksum(number: u64, payload: &[u8]) -> [u8; CHECKSUM] {
 }
 
 /// The payload of the state after `step` steps, with the bytes of new warnings.
-fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8]) -> Vec<u8> {
+fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8], has_torques: bool) -> Vec<u8> {
     let before = step.checked_sub(1).map(|before| before as u64);
     let kept = before.and_then(|before| record.contact_range(before));
     let hidden = before.map_or(0..0, |before| record.hidden.of_step(before));
@@ -290,6 +291,7 @@ fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8]) -> V
     let bodies = record.bodies.len();
     let of_bodies = step * bodies..(step + 1) * bodies;
     let [kept, pushing] = [kept, pushing].map(Option::unwrap_or_default);
+    let torques = if has_torques { pushing.clone() } else { 0..0 };
     [
         bytemuck::bytes_of(&head),
         bytemuck::cast_slice(&record.poses[of_bodies.clone()]),
@@ -303,6 +305,7 @@ fn state(record: &RunRecord, step: usize, report: &StepReport, told: &[u8]) -> V
         bytemuck::cast_slice(&record.forces.ids[pushing.clone()]),
         bytemuck::cast_slice(&record.forces.points[pushing.clone()]),
         bytemuck::cast_slice(&record.forces.contacts[pushing]),
+        bytemuck::cast_slice(&record.forces.torques[torques]),
         bytemuck::cast_slice(&record.forces.joints[of_joints]),
         told,
     ]
@@ -342,6 +345,10 @@ fn read_state<'a>(mut payload: &'a [u8], run: &mut PartialRun) -> Option<&'a [u8
         forces.ids.extend(take::<[u32; 2]>(&mut payload, count)?);
         forces.points.extend(take::<[f64; 3]>(&mut payload, count)?);
         forces.contacts.extend(take::<[f32; 6]>(&mut payload, count)?);
+        match record.has_torques {
+            true => forces.torques.extend(take::<f32>(&mut payload, count)?),
+            false => forces.torques.resize(forces.ids.len(), 0.0),
+        }
         forces.joints.extend(take::<[f32; 8]>(&mut payload, record.joints.len())?);
         forces.steps.push(steps.checked_sub(1)?);
         forces.ends.push(forces.ids.len() as u64);

@@ -61,6 +61,8 @@ pub struct Link {
     pub collisions: Vec<Collision>,
     /// Coefficient of friction, where the file has one.
     pub friction: Option<f64>,
+    /// Coefficient of torsional friction, m, where the file has one.
+    pub friction_torsional: Option<f64>,
     /// The bits of its groups, and of those that it meets: two links meet where one of them meets a
     /// group of the other.
     pub groups: [u32; 2],

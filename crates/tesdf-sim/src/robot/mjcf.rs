@@ -154,7 +154,8 @@ impl File<'_> {
         body: &Body,
         unread: &mut Vec<Unread>,
     ) -> Result<Link, RobotError> {
-        let (mut collisions, mut masses, mut friction) = (Vec::new(), Vec::new(), None);
+        let (mut collisions, mut masses) = (Vec::new(), Vec::new());
+        let (mut friction, mut friction_torsional) = (None, None);
         let mut groups = BTreeSet::new();
         let from_geoms = self.model.compiler.inertia_from_geom;
         let needs_mass = from_geoms == InertiaFromGeom::True
@@ -175,12 +176,14 @@ impl File<'_> {
                 let found = format!("geom {name} has another contype or conaffinity than the ones before it");
                 return Err(self.at(k, format!("{found}; expected the same of all geoms of a body")));
             }
-            if geom.condim > 3 {
+            if geom.condim > 4 {
                 let place = format!("{}: geom {name} has condim {}", self.place(k), geom.condim);
                 unread.push(Unread { element: "condim".into(), place });
             }
-            let slide = if geom.condim == 1 { 0.0 } else { geom.friction[0] };
-            friction = Some(friction.map_or(slide, |most: f64| most.max(slide)));
+            let [slide, spin, _] = geom.friction;
+            let greatest = |most: Option<f64>, of: f64| Some(most.map_or(of, |most| most.max(of)));
+            friction = greatest(friction, if geom.condim == 1 { 0.0 } else { slide });
+            friction_torsional = greatest(friction_torsional, if geom.condim > 3 { spin } else { 0.0 });
             collisions.push(collision);
         }
         let joint = match body.joints.as_slice() {
@@ -202,6 +205,7 @@ impl File<'_> {
             mass: self.mass(k, body, masses)?,
             collisions,
             friction,
+            friction_torsional,
             groups: groups.first().copied().unwrap_or([1; 2]),
         })
     }

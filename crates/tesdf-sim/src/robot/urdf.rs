@@ -191,6 +191,7 @@ impl<'a> File<'a> {
             mass,
             collisions: collisions.map(|collision| self.collision(collision)).collect::<Result<_, _>>()?,
             friction: None,
+            friction_torsional: None,
             groups: [1; 2],
         })
     }

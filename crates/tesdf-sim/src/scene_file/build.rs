@@ -66,6 +66,7 @@ impl LoadedScene {
                 .map_err(|e| self.body_error(k, instance_reason(e)))?;
             system
                 .set_friction(body, section.friction)
+                .and_then(|()| system.set_friction_torsional(body, section.friction_torsional))
                 .and_then(|()| system.set_restitution(body, section.restitution))
                 .and_then(|()| system.set_linear_damping(body, section.linear_damping))
                 .and_then(|()| system.set_angular_damping(body, section.angular_damping))

@@ -15,6 +15,9 @@ impl LoadedScene {
             let at = |reason: String| self.value("friction", format!("number {}: {reason}", k + 1));
             let [a, b] = pair_of(system, &pair.bodies).map_err(at)?;
             system.set_pair_friction(a, b, pair.coefficient).map_err(|e| at(e.to_string()))?;
+            if let Some(torsional) = pair.torsional {
+                system.set_pair_friction_torsional(a, b, torsional).map_err(|e| at(e.to_string()))?;
+            }
         }
         for (k, pair) in self.scene.exclude.iter().enumerate() {
             let at = |reason: String| self.value("exclude", format!("number {}: {reason}", k + 1));

@@ -148,6 +148,9 @@ pub struct FrictionSection {
     pub bodies: [String; 2],
     /// Coefficient of friction.
     pub coefficient: f64,
+    /// Coefficient of torsional friction, m [default: that which follows from the bodies].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torsional: Option<f64>,
 }
 
 /// Two bodies that have no contacts with each other, such as a shaft and a gear whose bearing is a
@@ -319,6 +322,11 @@ pub struct BodySection {
     /// Coefficient of friction. Between two bodies the geometric mean of theirs acts.
     #[serde(default)]
     pub friction: f64,
+    /// Coefficient of torsional friction, m: a contact resists spin about its normal by a moment of at
+    /// most this length times the force along the normal. Between two bodies the geometric mean of
+    /// theirs acts.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub friction_torsional: f64,
     /// Coefficient of restitution. Between two bodies the geometric mean of theirs acts.
     #[serde(default)]
     pub restitution: f64,
@@ -364,6 +372,7 @@ impl BodySection {
             fixed: false,
             kinematic: false,
             friction: 0.0,
+            friction_torsional: 0.0,
             restitution: 0.0,
             linear_damping: 0.0,
             angular_damping: 0.0,

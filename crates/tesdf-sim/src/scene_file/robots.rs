@@ -48,6 +48,10 @@ pub struct RobotSection {
     /// URDF has none: 0].
     #[serde(default)]
     pub friction: Option<f64>,
+    /// Coefficient of torsional friction of all bodies, m [default: of MJCF the greatest of the body's
+    /// geoms with a `condim` of 4 or 6; URDF has none: 0].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_torsional: Option<f64>,
     /// Whether links that are not neighbours have contacts with each other.
     #[serde(default = "yes")]
     pub self_contacts: bool,
@@ -473,6 +477,7 @@ impl<'a> Builder<'a> {
             fixed: placed.is_fixed,
             parts: parts.to_vec(),
             friction: self.section.friction.or(link.friction).unwrap_or(0.0),
+            friction_torsional: self.section.friction_torsional.or(link.friction_torsional).unwrap_or(0.0),
             ..BodySection::new(self.name(&link.name))
         };
         if let Some(MassProperties { mass, center, inertia }) = link.mass.filter(|_| !placed.is_fixed) {

@@ -28,5 +28,6 @@ mod separation;
 mod sleep;
 mod still;
 mod support;
+mod torsional;
 mod warnings;
 mod worlds;

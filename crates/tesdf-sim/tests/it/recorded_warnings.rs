@@ -6,7 +6,9 @@ use serde_json::{Value, json};
 use tesdf::collide::{Contact, HiddenOverlap, InstanceId};
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::newton::Newton;
-use tesdf_sim::record::{InterruptedRun, RUN_VERSION, RecordError, RunJournal, RunOrigin, RunRecord};
+use tesdf_sim::record::{
+    InterruptedRun, RUN_VERSION_WITHOUT_TORQUES, RecordError, RunJournal, RunOrigin, RunRecord,
+};
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{
     Dynamics, DynamicsError, Motor, PartialRun, Run, State, StepReport, System, Warning, WarningKind, Wrench,
@@ -348,7 +350,7 @@ fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 /// A journal of these frames, with right checksums.
 fn journal_of(frames: &[Vec<u8>]) -> Vec<u8> {
-    let mut bytes = [&b"tesdfrun"[..], &RUN_VERSION.to_le_bytes()].concat();
+    let mut bytes = [&b"tesdfrun"[..], &RUN_VERSION_WITHOUT_TORQUES.to_le_bytes()].concat();
     for (number, payload) in (0u64..).zip(frames) {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&number.to_le_bytes()).update(payload);

@@ -5,7 +5,7 @@ use super::state::{State, bounded};
 use super::{Effort, Interior, Limits, Solution, WIDTHS};
 use crate::Residual;
 use crate::newton::lanes::{Lanes, WIDTH};
-use crate::newton::line::{Bundle, Forces, dot};
+use crate::newton::line::{Bundle, Forces, Slips, dot};
 use crate::newton::linear::{BlockMatrix, Factor};
 
 /// Lagged limits stay once the root of ν is below this gap, m.
@@ -156,7 +156,7 @@ impl<'a> Iterate<'a> {
                 let way = bundle.slip.as_ref().map_or([Lanes::ZERO; 2], |slip| slip.way.map(|way| -way));
                 bundle.act(-(k * bundle.gap), way, &mut acting);
                 let [zero, one] = [0.0, 1.0].map(Lanes::splat);
-                sum.add(bundle, k, [zero; 2], [one, zero, one]);
+                sum.add(bundle, k, (&bundle.normal, [zero; 2]), [one, zero, one]);
             }
             group.act(acting.map(Lanes::sum), &mut momentum);
             matrix.add(group, &sum.total(!batch.slips));
@@ -177,7 +177,17 @@ impl<'a> Iterate<'a> {
 
     /// What the rows do.
     fn forces(&self) -> Vec<Forces> {
-        self.states.iter().zip(&self.of.lines.bundles).map(|(state, bundle)| state.forces(bundle)).collect()
+        let lines = self.of.lines;
+        let mut all: Vec<Forces> =
+            self.states.iter().zip(&lines.bundles).map(|(state, bundle)| state.forces(bundle)).collect();
+        for (k, bundle) in lines.bundles.iter().enumerate() {
+            if let Some(Slips { torsion: Some(torsion), .. }) = bundle.slip {
+                let push = all[torsion.of].push;
+                let of_push = |push, friction| if push == 0.0 { 0.0 } else { friction };
+                all[k].friction = all[k].friction.map(|friction| push.zip(friction, of_push));
+            }
+        }
+        all
     }
 
     /// Finds what an iteration has to know. Returns the matrix, the momentum that velocities and
@@ -206,23 +216,28 @@ impl<'a> Iterate<'a> {
             let relative = group.of(&self.velocity);
             let (mut sum, mut acting, mut change) = (Sum::default(), [Lanes::ZERO; 6], [Lanes::ZERO; 6]);
             for k in batch.bundles.clone() {
+                let of = lines.pushing(k);
+                let push = self.states[of].force;
                 let (bundle, state) = (&lines.bundles[k], &mut self.states[k]);
-                let local = Local::new(bundle, state, &relative, limits, k, self.centre, width);
+                let local = Local::new(bundle, state, push, &relative, limits, k, self.centre, width);
                 if bundle.slip.is_some() {
                     state.friction = local.slip.share.map(|share| -(local.slip.limit * share));
                 }
                 bundle.act(state.force, state.friction, &mut acting);
                 let away = state.products().map(|product| -product);
-                let standing = local.standing(bundle, state, &away, self.least, is_coulomb);
+                let followed = (of != k).then(|| self.standing[of].push);
+                let standing = local.standing(bundle, state, &away, self.least, followed, is_coulomb);
                 bundle.act(standing.push, standing.added(state), &mut change);
                 let follows = match (&bundle.slip, is_coulomb) {
                     (Some(slip), true) => {
-                        let follows = -(slip.coefficient * local.stiffness);
+                        let stiffness = if of == k { local.stiffness } else { self.locals[of].stiffness };
+                        let follows = -(slip.coefficient * stiffness);
                         local.slip.along.map(|along| follows * along)
                     }
                     _ => [Lanes::ZERO; 2],
                 };
-                sum.add(bundle, local.stiffness, follows, local.slip.stiffness);
+                let normal = &lines.bundles[of].normal;
+                sum.add(bundle, local.stiffness, (normal, follows), local.slip.stiffness);
                 self.locals.push(local);
                 self.standing.push(standing);
                 self.aims.push(away);
@@ -252,7 +267,10 @@ impl<'a> Iterate<'a> {
             let mut change = [Lanes::ZERO; 6];
             for k in batch.bundles.clone() {
                 let (bundle, state) = (&lines.bundles[k], &self.states[k]);
-                let standing = self.locals[k].standing(bundle, state, &self.aims[k], centre, is_coulomb);
+                let of = lines.pushing(k);
+                let followed = (of != k).then(|| self.standing[of].push);
+                let standing =
+                    self.locals[k].standing(bundle, state, &self.aims[k], centre, followed, is_coulomb);
                 bundle.act(standing.push, standing.added(state), &mut change);
                 self.standing[k] = standing;
             }
@@ -274,7 +292,9 @@ impl<'a> Iterate<'a> {
             for k in batch.bundles.clone() {
                 let (bundle, local, state) = (&lines.bundles[k], &self.locals[k], &self.states[k]);
                 let (standing, products) = (&self.standing[k], &self.aims[k]);
-                let yields = local.stiffness * dot(&bundle.normal, &relative);
+                let yields_at =
+                    |k: usize| self.locals[k].stiffness * dot(&lines.bundles[k].normal, &relative);
+                let yields = yields_at(k);
                 let force = standing.push - yields;
                 let slack = [
                     (products[0] - state.slack[0] * force) / state.room[0],
@@ -288,7 +308,8 @@ impl<'a> Iterate<'a> {
                     friction[0] -= xx * x + xy * y;
                     friction[1] -= xy * x + yy * y;
                     if is_coulomb {
-                        let follows = slip.coefficient * yields;
+                        let follows =
+                            slip.coefficient * slip.torsion.map_or(yields, |torsion| yields_at(torsion.of));
                         friction[0] += follows * u;
                         friction[1] += follows * v;
                     }
@@ -355,13 +376,14 @@ impl<'a> Iterate<'a> {
         (((1.0 - shorter) * corrected.longest).min(1.0), centre)
     }
 
-    /// Goes along a direction.
+    /// Goes along a direction. Returns the greatest way that torsional friction would bring beyond its
+    /// limit, m.
     #[inline(always)]
-    fn advance(&mut self, direction: &Direction, step: f64, limits: &Limits) {
+    fn advance(&mut self, direction: &Direction, step: f64, limits: &Limits) -> f64 {
+        let mut beyond = Lanes::ZERO;
         self.velocity.iter_mut().zip(&direction.velocity).for_each(|(v, change)| *v += step * change);
-        for (k, ((state, change), bundle)) in
-            self.states.iter_mut().zip(&direction.rows).zip(&self.of.lines.bundles).enumerate()
-        {
+        for (k, (change, bundle)) in direction.rows.iter().zip(&self.of.lines.bundles).enumerate() {
+            let state = &mut self.states[k];
             let force = change.force * step;
             state.force += force;
             state.room[0] += force;
@@ -369,12 +391,18 @@ impl<'a> Iterate<'a> {
             state.slack[0] += change.slack[0] * step;
             state.slack[1] += change.slack[1] * step;
             let Some(slip) = &bundle.slip else { continue };
-            let limit = limits.of(k, slip, state.force);
+            // That which limits torsional friction has gone along before.
+            let limit = limits.of(k, slip, self.states[self.of.lines.pushing(k)].force);
+            let state = &mut self.states[k];
             let [x, y] = [0, 1].map(|k| state.friction[k] + (change.friction[k] - state.friction[k]) * step);
             let size = (x * x + y * y).sqrt();
             let share = limit.zip(size, |limit, size| if size > limit { limit / size } else { 1.0 });
             state.friction = [x * share, y * share];
+            if slip.torsion.is_some() {
+                beyond = beyond.max((size - limit) / slip.scale);
+            }
         }
+        beyond.0.into_iter().fold(0.0, f64::max)
     }
 
     /// The greatest gap and force that do not fit, m.
@@ -423,7 +451,7 @@ impl<'a> Iterate<'a> {
             self.iterations += 1;
             let (step, centre) = self.next(&factor, &momentum, &brought, is_coulomb, &mut directions);
             let direction = &directions[1];
-            self.advance(direction, step, &limits);
+            let beyond = self.advance(direction, step, &limits);
             self.centre = (self.centre + step * (centre - self.centre)).max(self.least);
             let way = self.of.way(&direction.velocity);
             if !way.is_finite() {
@@ -436,6 +464,7 @@ impl<'a> Iterate<'a> {
                 && way < effort.settled
                 && open() < CLOSED
                 && is_balanced()
+                && beyond < balanced
                 && self.product() <= few
             {
                 if !has_friction || width + 1 == WIDTHS.len() {
@@ -466,11 +495,13 @@ impl<'a> Iterate<'a> {
 }
 
 impl Local {
-    /// Of bundle `k`.
+    /// Of bundle `k`, whose friction follows `push`.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "what an iteration has at hand")]
     fn new(
         bundle: &Bundle,
         state: &State,
+        push: Lanes,
         relative: &[f64; 6],
         limits: &Limits,
         k: usize,
@@ -485,7 +516,7 @@ impl Local {
         let slip = bundle.slip.as_ref().map_or(Slipping::default(), |slip| {
             let [x, y] = slip.change(relative);
             let u = [slip.way[0] + x, slip.way[1] + y];
-            let limit = limits.of(k, slip, state.force);
+            let limit = limits.of(k, slip, push);
             // A spring sticks as softly as it pushes.
             let least = (slip.scale * width).max(limit * bundle.compliance * 0.5);
             let width = (Lanes::splat(centre) / limit).max(least);
@@ -507,6 +538,7 @@ impl Local {
     }
 
     /// The changes when the velocities stay, to these changes of the products, and to ν of friction.
+    /// Friction follows its own push, or that which has `followed`.
     #[inline(always)]
     fn standing(
         &self,
@@ -514,6 +546,7 @@ impl Local {
         state: &State,
         products: &[Lanes; 2],
         centre: f64,
+        followed: Option<Lanes>,
         is_coulomb: bool,
     ) -> Standing {
         let [low, high] = [0, 1].map(|k| products[k] / state.room[k]);
@@ -522,6 +555,7 @@ impl Local {
             let at = &self.slip;
             let wider = (Lanes::splat(centre) / at.limit).max(at.least) - at.width;
             let [k, wider] = [at.limit / (at.width + at.length), at.limit * wider / at.length];
+            let push = followed.unwrap_or(push);
             let follows = if is_coulomb { slip.coefficient * push } else { Lanes::ZERO };
             [0, 1].map(|i| wider * at.share[i] - k * at.slip[i] - follows * at.along[i])
         });
@@ -542,10 +576,16 @@ impl Standing {
 struct Sum([[Lanes; 6]; 6]);
 
 impl Sum {
-    /// `push` is the decrease of the push with the gap, `follows` that of the friction with the
-    /// gap, and `slip` that of the friction with the slip: xx, xy, yy.
+    /// `push` is the decrease of the push with the gap, `follows` that of the friction with the gap
+    /// that has the derivatives `of`, and `slip` that of the friction with the slip: xx, xy, yy.
     #[inline(always)]
-    fn add(&mut self, bundle: &Bundle, push: Lanes, follows: [Lanes; 2], slip: [Lanes; 3]) {
+    fn add(
+        &mut self,
+        bundle: &Bundle,
+        push: Lanes,
+        (of, follows): (&[Lanes; 6], [Lanes; 2]),
+        slip: [Lanes; 3],
+    ) {
         let normal = &bundle.normal;
         match &bundle.slip {
             None => {
@@ -562,8 +602,8 @@ impl Sum {
                 for (c, column) in self.0.iter_mut().enumerate() {
                     let products = [
                         push * normal[c],
-                        follows[0] * normal[c] + slip[0] * x[c] + slip[1] * y[c],
-                        follows[1] * normal[c] + slip[1] * x[c] + slip[2] * y[c],
+                        follows[0] * of[c] + slip[0] * x[c] + slip[1] * y[c],
+                        follows[1] * of[c] + slip[1] * x[c] + slip[2] * y[c],
                     ];
                     for r in 0..6 {
                         column[r] += normal[r] * products[0] + x[r] * products[1] + y[r] * products[2];
