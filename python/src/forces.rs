@@ -14,6 +14,7 @@ pub fn of_contacts<'py>(py: Python<'py>, forces: &[ContactForce]) -> PyResult<Bo
         .add_rows("normals", vectors(|force| force.normal))?
         .add("normal_forces", forces.iter().map(|force| force.normal_force))?
         .add_rows("frictions", vectors(|force| force.friction))?
+        .add("torques", forces.iter().map(|force| force.torque))?
         .build("ContactForces")
 }
 

@@ -14,21 +14,21 @@ use tesdf_sim::{RunRecord, System};
 use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::cancellable;
 use crate::pool;
-use crate::simulation::Simulation;
+use crate::simulation::{RecordedRun, Simulation};
 
 // A constant in a signature would be "..." for readers in Python.
 const _: () = assert!(ContactOptions::MOST == 128);
 
 /// Writes a run as an animated GLB file, which Blender, three.js and others play.
 ///
-/// - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
-///   far are taken.
+/// - run: the path of a run of `tesdf simulate` or Simulation.save, a Simulation, whose steps so far
+///   are taken, or a Record.
 /// - path: the file.
 /// - every: every N-th step and the last one are played. fps: the steps nearest to this many times
 ///   in each second of the run. Without both, at most 1000 steps are.
 /// - speed: seconds of the run in each second of the animation.
 /// - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-///   paths. Not for a Simulation, which has its meshes.
+///   paths. Not for a Simulation or Record, which has its meshes.
 ///
 /// Each body is a node with its name; lengths are metres, and y is up, as glTF wants it. The same
 /// run gives the bytes of `tesdf export`.
@@ -56,8 +56,8 @@ pub fn export(
 /// Writes a page that plays a run in a browser, with its contacts. The page is one file that needs
 /// no server and asks for nothing.
 ///
-/// - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
-///   far are taken.
+/// - run: the path of a run of `tesdf simulate` or Simulation.save, a Simulation, whose steps so far
+///   are taken, or a Record.
 /// - path: the file.
 /// - every: every N-th step and the last one are played. fps: the steps nearest to this many times
 ///   in each second of the run. Without both, at most 1000 steps are.
@@ -65,7 +65,7 @@ pub fn export(
 ///   Contacts that the run has not recorded are detected again, which Ctrl-C ends.
 /// - title: heading of the page; None is the name of the run.
 /// - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-///   paths. Not for a Simulation, which has its meshes.
+///   paths. Not for a Simulation or Record, which has its meshes.
 ///
 /// The same run gives the bytes of `tesdf view`.
 ///
@@ -157,22 +157,28 @@ fn write(
     let pool = pool::shared().map_err(|e| e.raise(py))?;
     let (progress, stop) = (Progress::default(), AtomicBool::new(false));
     let simulation = run.cast::<Simulation>().ok().map(|simulation| simulation.get());
+    // Of a Record.
+    let recorded = run.getattr("_run").and_then(|run| Ok(run.cast_into::<RecordedRun>()?)).ok();
+    let recorded = recorded.as_ref().map(|recorded| recorded.get());
     let file: Option<PathBuf> = run.extract().ok();
-    if simulation.is_none() && file.is_none() {
-        return Err(argument("run", kind_of(run), "a path or a Simulation"));
+    if simulation.is_none() && recorded.is_none() && file.is_none() {
+        return Err(argument("run", kind_of(run), "a path, a Simulation, or a Record of this process"));
     }
-    if simulation.is_some() && geometries.is_some() {
-        return Err(argument("geometries", "given for a Simulation", "None: it has its meshes"));
+    if file.is_none() && geometries.is_some() {
+        return Err(argument("geometries", "given for a Simulation or Record", "None: it has its meshes"));
     }
     let geometries = geometries.unwrap_or_default();
     let work = || {
         pool.install(|| {
-            let source = match (simulation, file) {
+            let source = match (simulation, recorded) {
                 (Some(simulation), _) => {
                     let (record, system) = simulation.so_far()?;
                     Source::of_simulation(record, system)?
                 }
-                (None, file) => Source::open(&file.unwrap_or_default(), &geometries, &progress)?,
+                (None, Some(RecordedRun { record, system })) => {
+                    Source::of_simulation(record.clone(), system.clone())?
+                }
+                (None, None) => Source::open(&file.unwrap_or_default(), &geometries, &progress)?,
             };
             let inputs: Vec<&Path> = source.inputs.iter().map(PathBuf::as_path).collect();
             let refused = |e: SaveError| Error::Record(path.to_path_buf(), e.into());

@@ -180,6 +180,11 @@ pub fn frictions(system: &System) -> impl Iterator<Item = f64> {
     system.bodies().iter().map(|body| body.friction)
 }
 
+/// The coefficient of torsional friction of each body, m.
+pub fn frictions_torsional(system: &System) -> impl Iterator<Item = f64> {
+    system.bodies().iter().map(|body| body.friction_torsional)
+}
+
 /// An array of this shape.
 pub fn shaped<'py>(
     py: Python<'py>,

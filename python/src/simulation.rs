@@ -147,6 +147,13 @@ impl Snapshot {
     }
 }
 
+/// What a Record plays: its run, and the meshes of its bodies.
+#[pyclass(frozen, module = "tesdf")]
+pub struct RecordedRun {
+    pub record: RunRecord,
+    pub system: System,
+}
+
 impl Simulation {
     fn locked(&self) -> MutexGuard<'_, Running> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
@@ -307,7 +314,7 @@ impl Simulation {
     /// All states so far, recorded contacts, forces and warnings: Record(times, poses, velocities,
     /// ...), copied.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let record = self.try_read(py, Running::record)?;
+        let (record, system) = self.try_read(py, |r| Ok((r.record()?, r.system().clone())))?;
         let (steps, bodies) = (record.times().len(), record.bodies.len());
         let each = || (0..steps).flat_map(|step| (0..bodies).map(move |body| (step, body)));
         let poses = each().filter_map(|(step, body)| record.pose(step, body)).flat_map(|p| of_pose(&p));
@@ -337,6 +344,7 @@ impl Simulation {
             .with("contact_forces", forces::of_contacts(py, &pushing)?)?
             .with("joint_forces", forces::of_joints(py, &joints)?)?
             .with("warnings", classes::dict(py, &record.warnings())?)?
+            .with("_run", Bound::new(py, RecordedRun { record, system })?.into_any())?
             .build("Record")
     }
 
@@ -512,6 +520,19 @@ impl Simulation {
         self.set(py, |engine| engine.set_friction(body, coefficient).map_err(Error::Dynamics))
     }
 
+    /// Sets the coefficient of torsional friction of a body, m, given by its name or number, from the
+    /// next step on: a contact resists spin about its normal by a moment of at most this length times
+    /// its force. Otherwise as set_friction.
+    fn set_friction_torsional(
+        &self,
+        py: Python<'_>,
+        body: &Bound<'_, PyAny>,
+        coefficient: f64,
+    ) -> PyResult<()> {
+        let body = index_of("body", body, &self.bodies(py))?;
+        self.set(py, |engine| engine.set_friction_torsional(body, coefficient).map_err(Error::Dynamics))
+    }
+
     /// Sets gravity [3], m/s², from the next step on. All bodies wake. A reset leaves it as it is.
     fn set_gravity(&self, py: Python<'_>, gravity: [f64; 3]) -> PyResult<()> {
         let gravity = DVec3::from_array(gravity);
@@ -589,6 +610,12 @@ impl Simulation {
     #[getter]
     fn frictions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.read(py, |r| settings::frictions(r.system()).collect()))
+    }
+
+    /// Coefficients of torsional friction [B] of the bodies, m.
+    #[getter]
+    fn frictions_torsional<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.read(py, |r| settings::frictions_torsional(r.system()).collect()))
     }
 
     /// Gravity [3], m/s².

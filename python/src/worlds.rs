@@ -317,6 +317,23 @@ impl Worlds {
         })
     }
 
+    /// Sets the coefficients of torsional friction of a body, m: a number or [k], as in
+    /// Simulation.set_friction_torsional.
+    #[pyo3(signature = (body, coefficient, *, worlds = None))]
+    fn set_friction_torsional(
+        &self,
+        py: Python<'_>,
+        body: &Bound<'_, PyAny>,
+        coefficient: &Bound<'_, PyAny>,
+        worlds: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (body, chosen) = (self.body(py, body)?, self.chosen(py, worlds)?);
+        let values = columns::<1>("coefficient", coefficient, chosen.len())?;
+        self.set(py, chosen, values, |engine, [coefficient]| {
+            engine.set_friction_torsional(body, coefficient).map_err(Error::Dynamics)
+        })
+    }
+
     /// Sets gravity: [3] or [k, 3], m/s², as in Simulation.set_gravity.
     #[pyo3(signature = (gravity, *, worlds = None))]
     fn set_gravity(
@@ -535,6 +552,15 @@ impl Worlds {
     fn frictions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let [bodies, _] = self.counts(py);
         self.numbers(py, &[bodies], |world, to| to.extend(settings::frictions(world.engine().system())))
+    }
+
+    /// Coefficients of torsional friction [n, B] of the bodies, m.
+    #[getter]
+    fn frictions_torsional<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let [bodies, _] = self.counts(py);
+        self.numbers(py, &[bodies], |world, to| {
+            to.extend(settings::frictions_torsional(world.engine().system()));
+        })
     }
 
     /// Gravity [n, 3], m/s².

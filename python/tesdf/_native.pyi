@@ -755,6 +755,10 @@ class Simulation:
         """Sets the coefficient of friction of a body, given by its name or number, from the next step
         on. Between two bodies the geometric mean of theirs acts, unless the scene gives one for the
         pair. The body wakes, with those that it touches. A reset leaves it as it is."""
+    def set_friction_torsional(self, body: str | int, coefficient: float) -> None:
+        """Sets the coefficient of torsional friction of a body, m, given by its name or number, from the
+        next step on: a contact resists spin about its normal by a moment of at most this length times
+        its force. Otherwise as set_friction."""
     def set_gravity(self, gravity: Sequence[float]) -> None:
         """Sets gravity [3], m/s², from the next step on. All bodies wake. A reset leaves it as it is."""
     def reset(self, *, poses: npt.ArrayLike | None = None, velocities: npt.ArrayLike | None = None) -> None:
@@ -781,6 +785,9 @@ class Simulation:
     @property
     def frictions(self) -> npt.NDArray[np.float64]:
         """Coefficients of friction [B] of the bodies."""
+    @property
+    def frictions_torsional(self) -> npt.NDArray[np.float64]:
+        """Coefficients of torsional friction [B] of the bodies, m."""
     @property
     def gravity(self) -> npt.NDArray[np.float64]:
         """Gravity [3], m/s²."""
@@ -883,6 +890,11 @@ class Worlds:
         inertia [6] or [k, 6], kg m², as in Simulation.set_mass."""
     def set_friction(self, body: str | int, coefficient: _Numbers, *, worlds: npt.ArrayLike | None = None) -> None:
         """Sets the coefficients of friction of a body: a number or [k], as in Simulation.set_friction."""
+    def set_friction_torsional(
+        self, body: str | int, coefficient: _Numbers, *, worlds: npt.ArrayLike | None = None
+    ) -> None:
+        """Sets the coefficients of torsional friction of a body, m: a number or [k], as in
+        Simulation.set_friction_torsional."""
     def set_gravity(self, gravity: npt.ArrayLike, *, worlds: npt.ArrayLike | None = None) -> None:
         """Sets gravity: [3] or [k, 3], m/s², as in Simulation.set_gravity."""
     def set_motor(
@@ -964,12 +976,15 @@ class Worlds:
     def frictions(self) -> npt.NDArray[np.float64]:
         """Coefficients of friction [n, B] of the bodies."""
     @property
+    def frictions_torsional(self) -> npt.NDArray[np.float64]:
+        """Coefficients of torsional friction [n, B] of the bodies, m."""
+    @property
     def gravity(self) -> npt.NDArray[np.float64]:
         """Gravity [n, 3], m/s²."""
     def __len__(self) -> int: ...
 
 def export(
-    run: _Path | Simulation,
+    run: _Path | Simulation | Record,
     path: _Path,
     *,
     every: int | None = None,
@@ -979,14 +994,14 @@ def export(
 ) -> None:
     """Writes a run as an animated GLB file, which Blender, three.js and others play.
 
-    - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
-      far are taken.
+    - run: the path of a run of `tesdf simulate` or Simulation.save, a Simulation, whose steps so far
+      are taken, or a Record.
     - path: the file.
     - every: every N-th step and the last one are played. fps: the steps nearest to this many times
       in each second of the run. Without both, at most 1000 steps are.
     - speed: seconds of the run in each second of the animation.
     - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-      paths. Not for a Simulation, which has its meshes.
+      paths. Not for a Simulation or Record, which has its meshes.
 
     Each body is a node with its name; lengths are metres, and y is up, as glTF wants it. The same
     run gives the bytes of `tesdf export`.
@@ -994,7 +1009,7 @@ def export(
     Raises OSError if a file cannot be read or written, SceneError if a mesh is missing, and
     SimulationError if the run cannot be played."""
 def view(
-    run: _Path | Simulation,
+    run: _Path | Simulation | Record,
     path: _Path,
     *,
     every: int | None = None,
@@ -1006,8 +1021,8 @@ def view(
     """Writes a page that plays a run in a browser, with its contacts. The page is one file that needs
     no server and asks for nothing.
 
-    - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
-      far are taken.
+    - run: the path of a run of `tesdf simulate` or Simulation.save, a Simulation, whose steps so far
+      are taken, or a Record.
     - path: the file.
     - every: every N-th step and the last one are played. fps: the steps nearest to this many times
       in each second of the run. Without both, at most 1000 steps are.
@@ -1015,7 +1030,7 @@ def view(
       Contacts that the run has not recorded are detected again, which Ctrl-C ends.
     - title: heading of the page; None is the name of the run.
     - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-      paths. Not for a Simulation, which has its meshes.
+      paths. Not for a Simulation or Record, which has its meshes.
 
     The same run gives the bytes of `tesdf view`.
 

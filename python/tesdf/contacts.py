@@ -13,6 +13,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import functools
+import html
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -380,6 +381,8 @@ class ContactForces(_Table):
     """[N] force along the normal, N"""
     frictions: _Float
     """[N, 3] force across the normal on the first body, N"""
+    torques: _Float
+    """[N] moment of torsional friction about the normal on the first body, N m"""
 
     @property
     def forces(self) -> _Float:
@@ -409,7 +412,8 @@ class JointForces(_Table):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Record(_Rows):
-    """The states of B bodies after 0 to S steps of a simulation, and R recorded contacts."""
+    """The states of B bodies after 0 to S steps of a simulation, and R recorded contacts. A notebook plays
+    it, and `tesdf.view` and `tesdf.export` take it."""
 
     times: _Float
     """[S + 1] s"""
@@ -441,3 +445,14 @@ class Record(_Rows):
     """Q · J forces of joints, those of a step together"""
     warnings: list[dict[str, Any]]
     """what the steps did not do as the scene asks, as `warnings` of `summary()`"""
+    # The run with the meshes of its bodies, of the compiled module.
+    _run: object = None
+
+    def _repr_html_(self) -> str:
+        from .playback import _of_notebook
+
+        return f"<p>{html.escape(repr(self))}</p>" if self._run is None else _of_notebook(self, "record")
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy in another process has the arrays alone.
+        return {**vars(self), "_run": None}

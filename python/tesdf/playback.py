@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Union
 
 from . import _native
+from .contacts import Record
 from .errors import SimulationError
 
 _Path = Union[str, "PathLike[str]"]
@@ -41,21 +42,22 @@ class LiveView:
         return f'<iframe src="{self.url}" width="100%" height="520" style="border: 0"></iframe>'
 
 
-def _of_notebook(simulation: _native.Simulation) -> str:
-    """What a notebook shows of a simulation: the page of `view`, or where it would be too large or there
-    are no states, what to call instead."""
-    said = html.escape(repr(simulation))
-    every = max(1, -(-simulation.steps // _NOTEBOOK_FRAMES))
+def _of_notebook(run: _native.Simulation | Record, name: str = "simulation") -> str:
+    """What a notebook shows of a simulation or its record: the page of `view`, or where it would be too
+    large or there are no states, what to call instead."""
+    said = html.escape(repr(run))
+    steps = len(run) - 1 if isinstance(run, Record) else run.steps
+    every = max(1, -(-steps // _NOTEBOOK_FRAMES))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "page.html")
         try:
-            _native.view(simulation, path, every=every, contacts=0, title="simulation")
+            _native.view(run, path, every=every, contacts=0, title=name)
         except SimulationError as error:
             return f"<p>{said}</p><p>{html.escape(str(error))}; <code>view()</code> shows the steps to come</p>"
         size = path.stat().st_size
         page = path.read_text(encoding="utf-8") if size <= _NOTEBOOK_BYTES else None
     if page is None:
-        return f'<p>{said}</p><p>{size / 1e6:.0f} MB to play: <code>tesdf.view(simulation, "page.html")</code></p>'
+        return f'<p>{said}</p><p>{size / 1e6:.0f} MB to play: <code>tesdf.view({name}, "page.html")</code></p>'
     # Scripts of the page see nothing of the notebook.
     return (
         f'<iframe srcdoc="{html.escape(page)}" sandbox="allow-scripts" width="100%" height="520" '
@@ -64,7 +66,7 @@ def _of_notebook(simulation: _native.Simulation) -> str:
 
 
 def export(
-    run: _Path | _native.Simulation,
+    run: _Path | _native.Simulation | Record,
     path: _Path,
     *,
     every: int | None = None,
@@ -75,15 +77,15 @@ def export(
     """Writes a run as an animation: a GLB file, which Blender, three.js and others play, or, if the path
     ends with .rrd, a recording for the viewer of rerun.
 
-    - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
-      far are taken.
+    - run: the path of a run of `tesdf simulate` or Simulation.save, a Simulation, whose steps so far
+      are taken, or a Record.
     - path: the file.
     - every: every N-th step and the last one are played. fps: the steps nearest to this many times
       in each second of the run. Without both, at most 1000 steps are.
     - speed: seconds of the run in each second of the animation. Not for .rrd, whose viewer has a
       control of the speed.
     - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-      paths; "link*" are all bodies whose names begin with "link". Not for a Simulation, which has its meshes.
+      paths; "link*" are all bodies whose names begin with "link". Not for a Simulation or Record, which has its meshes.
 
     Each body is a node or an entity with its name; lengths are metres. In a GLB file y is up, as glTF
     wants it, and the same run gives the bytes of `tesdf export`. A recording has the frame of the

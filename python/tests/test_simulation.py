@@ -3,6 +3,7 @@
 import html
 import json
 import os
+import pickle
 import re
 import subprocess
 import urllib.request
@@ -331,6 +332,51 @@ def test_a_notebook_plays_a_run_or_says_what_to_call(scene, tmp_path, monkeypatc
     monkeypatch.setattr(tesdf.playback, "_NOTEBOOK_BYTES", 1000)
     assert "tesdf.view(simulation" in simulation._repr_html_() and len(simulation._repr_html_()) < 300
     assert "<code>view()</code>" in tesdf.Simulation(scene, history=False)._repr_html_()
+
+
+def test_a_notebook_plays_a_record(scene, tmp_path, monkeypatch):
+    simulation = tesdf.Simulation(scene)
+    simulation.run()
+    record = simulation.record()
+    simulation.reset()
+    shown = record._repr_html_()
+    source = re.fullmatch(r'<iframe srcdoc="([^"]*)" sandbox="allow-scripts" [^<>]*></iframe>', shown).group(1)
+    every = -(-(len(record.times) - 1) // 300)
+    tesdf.view(record, tmp_path / "page.html", every=every, contacts=0, title="record")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert html.unescape(source) == page
+    # It plays the run from which the record is.
+    simulation.run()
+    tesdf.view(simulation, tmp_path / "again.html", every=every, contacts=0, title="record")
+    assert page == (tmp_path / "again.html").read_text(encoding="utf-8")
+    monkeypatch.setattr(tesdf.playback, "_NOTEBOOK_BYTES", 1000)
+    assert "tesdf.view(record" in record._repr_html_() and len(record._repr_html_()) < 300
+    # In another process there are only arrays.
+    copy = pickle.loads(pickle.dumps(record))
+    assert np.array_equal(copy.poses, record.poses) and copy._repr_html_() == f"<p>{html.escape(repr(copy))}</p>"
+    with pytest.raises(ValueError, match="run: Record; expected a path, a Simulation, or a Record of this process"):
+        tesdf.view(copy, tmp_path / "page.html")
+
+
+def test_torsional_friction_stops_a_spin():
+    ball = {"name": "ball", "shape": {"sphere": {"radius": 0.05}}, "mass": 0.4, "translation": [0, 0, 0.05]}
+    floor = {"name": "floor", "shape": "plane", "fixed": True, "friction_torsional": 0.04}
+    bodies = [floor, {**ball, "friction_torsional": 0.0025, "angular_velocity": [0, 0, 20]}]
+    simulation = tesdf.Simulation({"time_step": 5e-3, "duration": 0.5, "record": {"forces_every": 1}, "bodies": bodies})
+    assert np.array_equal(simulation.frictions_torsional, [0.04, 0.0025])
+    inertia, limit = 0.4 * 0.4 * 0.05**2, 0.01 * 0.4 * 9.81
+    for _ in range(20):
+        simulation.step()
+    assert simulation.velocities[1, 5] == pytest.approx(20 - limit / inertia * 0.1, rel=1e-3)
+    forces = simulation.contact_forces
+    assert np.abs(forces.torques).sum() == pytest.approx(limit, rel=1e-6)
+    assert len(simulation.record().contact_forces.torques) >= 20
+    simulation.set_friction_torsional("floor", 0)
+    before = simulation.velocities[1, 5]
+    simulation.step()
+    assert simulation.velocities[1, 5] == pytest.approx(before, rel=1e-9)
+    with pytest.raises(tesdf.SimulationError, match="friction_torsional"):
+        simulation.set_friction_torsional("ball", -1)
 
 
 def test_a_page_follows_the_steps(scene):

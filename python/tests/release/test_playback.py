@@ -351,7 +351,7 @@ def test_options_and_errors(folder, tmp_path):
         tesdf.view(run, run)
     with pytest.raises(tesdf.SimulationError, match="not a run of tesdf"):
         tesdf.export(folder / "cube.obj", out)
-    with pytest.raises(ValueError, match="run: int; expected a path or a Simulation"):
+    with pytest.raises(ValueError, match="run: int; expected a path, a Simulation, or a Record"):
         tesdf.view(3, out)
     with pytest.raises(ValueError, match="geometries: given for a Simulation"):
         tesdf.view(tesdf.Simulation(folder / "scene.toml"), out, geometries={})
