@@ -26,6 +26,7 @@
 mod anderson;
 mod iteration;
 mod state;
+mod sum;
 
 use anderson::Anderson;
 use iteration::Iterate;
