@@ -137,6 +137,8 @@ def test_worlds_are_single_simulations(threads):
     def set_up(target, k=slice(None)):
         target.set_mass("box", mass[k])
         target.set_friction(0, friction[k])
+        target.set_friction_torsional(0, friction[k] / 10)
+        target.set_friction_torsional("box", 0.01)
         target.set_gravity(gravity[k])
 
     def act(target, k=slice(None)):
@@ -162,7 +164,7 @@ def test_worlds_are_single_simulations(threads):
         singles.append(single)
     assert worlds.steps.tolist() == [60, 30, 60, 30, 60] == [single.steps for single in singles]
     assert worlds.times.tolist() == [single.time for single in singles]
-    for name in ("poses", "velocities", "coordinates", "coordinate_rates", "masses", "frictions", "gravity"):
+    for name in ("poses", "velocities", "coordinates", "coordinate_rates", "masses", "frictions", "frictions_torsional", "gravity"):
         expected = np.stack([getattr(single, name) for single in singles])
         found = getattr(worlds, name)
         assert found.shape == expected.shape and found.tobytes() == expected.tobytes(), name
