@@ -27,60 +27,45 @@ pub fn minima(
             true
         }
         (_, Simple::Plane) if search.is_of_faces() && matches!(mode, Mode::Exact(_)) => {
-            if search.is_large(part) {
-                over_plane(part, reach, found)
-            } else {
-                flat_over_plane(search.tolerance, part, reach, found)
-            }
+            over_plane(search, part, reach, found)
         }
         _ => false,
     }
 }
 
-/// The minima of a large segment or triangle over the plane z = 0: its lowest point, and its other
-/// corners within reach if it looks at the plane. Returns `false` where corners are out of reach.
-fn over_plane(part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool {
+/// The minima over the plane z = 0 of a large segment or triangle, or of a small triangle whose corners
+/// are equally high up to the tolerance: the lowest point, and where the part looks at the plane its
+/// other corners. Returns `false` for parts that the search has to move into reach, or whose normal may
+/// be that of the other side.
+fn over_plane(search: &Search, part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool {
     let points = part.points();
     let is_triangle = points.len() == 3;
-    if is_triangle && part.normal == DVec3::ZERO {
+    let is_large = search.is_large(part);
+    // The extremes of a triangle are where the plane opposes it.
+    let has_extremes = !is_triangle || part.normal.z < OPPOSES;
+    let is_known = part.normal != DVec3::ZERO && part.facing == PartFacing::Everywhere;
+    if is_triangle && !is_known || !is_large && !(is_triangle && has_extremes) {
         return false;
     }
     let lower = |p: DVec3, q: DVec3| if q.z < p.z { q } else { p };
     let lowest = points[1..].iter().fold(points[0], |p, q| lower(p, *q));
-    // The extremes of a triangle are where the plane opposes it.
-    let has_extremes = !is_triangle || part.normal.z < OPPOSES;
-    // The search moves a corner that is out of reach inwards.
-    if is_triangle && has_extremes && points.iter().any(|p| p.z > reach) {
-        return false;
-    }
-    if lowest.z <= reach {
-        found(at(Simple::Plane, part, lowest, true));
-        let extremes = points.iter().filter(|p| has_extremes && **p != lowest && p.z <= reach);
-        extremes.for_each(|p| found(at(Simple::Plane, part, *p, false)));
-    }
-    true
-}
-
-/// The minima of a small triangle over the plane z = 0 whose corners are equally high up to the
-/// tolerance: all of them. Returns `false` for others.
-fn flat_over_plane(tolerance: f64, part: &Part, reach: f64, found: &mut impl FnMut(Minimum)) -> bool {
-    let &[a, b, c] = part.points() else { return false };
-    if part.normal.z >= OPPOSES || part.facing == PartFacing::AtCenter {
-        return false;
-    }
-    let lower = |p: DVec3, q: DVec3| if q.z < p.z { q } else { p };
-    let lowest = lower(lower(a, b), c);
     if lowest.z > reach {
         return true;
     }
-    let longest = [b - a, c - b, a - c].map(|edge| edge.length_squared()).into_iter().fold(0.0, f64::max);
-    let slope = DVec3::Z.reject_from_normalized(part.normal).length();
-    if [a, b, c].iter().any(|p| p.z > lowest.z + tolerance) || !is_level(slope, longest.sqrt(), tolerance) {
+    let is_flat = || {
+        let edges = (0..points.len()).map(|k| points[(k + 1) % points.len()] - points[k]);
+        let longest = edges.map(|edge| edge.length_squared()).fold(0.0, f64::max);
+        let slope = DVec3::Z.reject_from_normalized(part.normal).length();
+        points.iter().all(|p| p.z <= lowest.z + search.tolerance)
+            && is_level(slope, longest.sqrt(), search.tolerance)
+    };
+    let is_corner = |p: &DVec3| if is_large { p.z <= reach } else { true };
+    if is_triangle && has_extremes && !if is_large { points.iter().all(is_corner) } else { is_flat() } {
         return false;
     }
     found(at(Simple::Plane, part, lowest, true));
-    let others = [a, b, c].into_iter().filter(|p| *p != lowest);
-    others.for_each(|p| found(at(Simple::Plane, part, p, false)));
+    let extremes = points.iter().filter(|p| has_extremes && **p != lowest && is_corner(p));
+    extremes.for_each(|p| found(at(Simple::Plane, part, *p, false)));
     true
 }
 
@@ -171,15 +156,17 @@ mod tests {
         assert!(closed > 5000 && searched > 500 && contacts > 1500, "{closed} {searched} {contacts}");
     }
 
-    /// Small triangles over a plane: level, nearly so, tilted, needles, and turned over.
+    /// Small and large triangles over a plane: level, nearly so, tilted, needles, turned over, and such
+    /// whose other side may be outside.
     #[test]
     fn flat_parts_have_the_minima_of_the_search() {
         let mut k = 1;
         let field = FieldBody::in_own_frame(Field::Simple(Simple::Plane));
         let options = CollideOptions { mode: Mode::exact(), ..CollideOptions::default() };
-        let search = Search::new(&options, 0.2, &field, [100.0; 2]);
+        let searches = [100.0, 1.0].map(|diagonal| Search::new(&options, 0.2, &field, [diagonal; 2]));
         let (mut closed, mut searched, mut contacts) = (0, 0, 0);
         for case in 0..4000 {
+            let search = &searches[case / 60 % 2];
             let mut number = || random(&mut k);
             let tilt = [0.0, 1e-17, 0.1, 0.5, 3.0][case % 5] * search.tolerance;
             let wide = [1.0, 0.1, 1e-3][case / 5 % 3];
@@ -190,10 +177,12 @@ mod tests {
             if is_up != (case % 11 == 0) {
                 corners.swap(1, 2);
             }
-            let part = Part::new(&corners, 0.0);
-            assert!(!search.is_large(&part));
+            let mut part = Part::new(&corners, 0.0);
+            if case % 7 == 0 {
+                part.facing = PartFacing::AtCenter;
+            }
             let (mut found, mut expected) = (Vec::new(), Vec::new());
-            if !minima(Simple::Plane, &search, Mode::exact(), &part, &mut |m| found.push(bits(&m))) {
+            if !minima(Simple::Plane, search, Mode::exact(), &part, &mut |m| found.push(bits(&m))) {
                 assert!(found.is_empty());
                 searched += 1;
                 continue;
