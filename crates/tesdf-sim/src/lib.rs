@@ -16,6 +16,7 @@
 //! - [`script`]: keyframes of kinematic bodies, motors and wrenches.
 //! - [`scene_file`]: scenes as TOML files.
 //! - [`robot`]: robot descriptions in URDF and MJCF.
+//! - [`planning`]: clearance of a robot among obstacles, and certified motions, for planners.
 //! - [`criterion`]: what makes a run a success; other crates can add criteria.
 //! - [`Run`]: a run that is made step by step.
 //! - [`Worlds`]: many worlds of one scene, stepped on all threads, for control and learning.
@@ -33,6 +34,7 @@ mod forces;
 mod joint;
 mod mass;
 pub mod newton;
+pub mod planning;
 pub mod record;
 pub mod robot;
 pub mod scene_file;

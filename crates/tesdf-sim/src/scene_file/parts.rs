@@ -12,7 +12,7 @@ use tesdf::mesh::{RepairMode, SolidMesh, TriangleMesh};
 use super::{PoseSection, identity};
 
 /// Faces around the axis of a round part.
-const AROUND: usize = 64;
+pub(crate) const AROUND: usize = 64;
 
 /// A part of a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,7 +79,7 @@ fn ones() -> [f64; 3] {
 ///
 /// # Errors
 /// The part at fault.
-pub(super) fn joined(
+pub(crate) fn joined(
     resolve: &dyn Fn(&Path) -> PathBuf,
     parts: &[PartSection],
     repair: RepairMode,

@@ -15,6 +15,7 @@ mod lift;
 mod mass_by_rule;
 mod newton;
 mod passing;
+mod planning;
 mod poses;
 mod recorded_warnings;
 mod rest;

@@ -21,6 +21,8 @@
 //! - [`clearance`](clearance()): the signed distance between two instances, with witness points.
 //! - [`deepest_penetration`](deepest_penetration()): the deepest of many pairs, without the clearance
 //!   of each.
+//! - [`least_clearance`](least_clearance()): the least clearance of many pairs, or whether one is below
+//!   a bound.
 //! - [`time_of_impact`](time_of_impact()): the time at which two moving instances first touch,
 //!   or that they stay apart; never too late.
 //! - [`why`](why()): why a contact is present or missing.
@@ -59,7 +61,9 @@ pub mod internal {
     pub use super::search::greatest_minimum::greatest_minimum;
 }
 
+pub use clearance::apart::clearance_bound;
 pub use clearance::deepest_penetration::{DeepestPenetration, PenetrationOptions, deepest_penetration};
+pub use clearance::least_clearance::{LeastClearance, LeastClearanceOptions, least_clearance};
 pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use detect::candidates::{Candidate, candidates};
 pub use detect::coarse::{CoarseContact, coarse_contacts};

@@ -1,5 +1,7 @@
 //! The signed distance between two bodies, with its points.
+pub mod apart;
 pub mod deepest_penetration;
+pub mod least_clearance;
 
 use crate::parallel::*;
 use glam::DVec3;
@@ -295,6 +297,23 @@ impl<'a> Pair<'a> {
     fn order<'b>(&'b self, of: Surface, field: FieldBody<'b>) -> Order<'b> {
         let Body { shape, placement, .. } = self.body(of);
         Order { surface: SurfaceBody::new(shape, *placement, &field), field }
+    }
+
+    /// # Errors
+    /// Positions are too far out.
+    fn check_distances(&self) -> Result<(), CollideError> {
+        // Numbers in 32 bits end at some 1e38, and squares of distances at the square root of that.
+        const FAR: f64 = 1e15;
+        let far = |body: &Body, field: &FieldBody| {
+            let p = field.to_field(body.placement.pose.translation);
+            // A number that is none is far, too.
+            !(p.abs().max_element() <= FAR)
+        };
+        let is_far = [Surface::A, Surface::B].iter().any(|&of| far(self.body(of), &self.field(of)));
+        match is_far && !self.surfaces().iter().all(|(_, order)| order.has_distances()) {
+            true => Err(self.too_far()),
+            false => Ok(()),
+        }
     }
 
     pub(in crate::collide) fn too_far(&self) -> CollideError {

@@ -75,6 +75,12 @@ pub fn least(orders: &[Order], tolerance: f64) -> Option<Least> {
     Search::new(orders, tolerance, f64::INFINITY).run(MAX_PARTS).least
 }
 
+/// As [`least`], of signed distances below `below`, until one is at most `enough`. Nothing is found
+/// where none is lower than `below` by more than the tolerance.
+pub fn least_until(orders: &[Order], tolerance: f64, below: f64, enough: f64) -> Below {
+    Search { enough, ..Search::new(orders, tolerance, below) }.run(MAX_PARTS)
+}
+
 /// As [`least`], of any number of pairs, of points below a signed distance of at most 0: nothing is
 /// found where none is lower than `below` by more than the tolerance. Distances outside are then
 /// never wanted, which take most of the time where bodies touch.
@@ -102,6 +108,8 @@ struct Search<'a> {
     beside: f64,
     /// Only signed distances below this are wanted.
     below: f64,
+    /// The search ends with a signed distance up to this.
+    enough: f64,
     /// The lowest signed distance, in the world's unit, its order and its point.
     best: Option<(f64, usize, Lowest)>,
     /// The bounds are lower bounds of the signed distances, in the world's unit.
@@ -115,7 +123,8 @@ impl<'a> Search<'a> {
         let is_round = orders.iter().any(|order| order.surface.round_side().is_some());
         let beside = if is_round { FLAT * tolerance } else { 0.0 };
         let tolerance = tolerance - beside;
-        Self { orders, tolerance, beside, below, best: None, open: Queue::new(), waiting: Vec::new() }
+        let (best, enough) = (None, f64::NEG_INFINITY);
+        Self { orders, tolerance, beside, below, enough, best, open: Queue::new(), waiting: Vec::new() }
     }
 
     /// Searches at most this number of parts.
@@ -130,6 +139,10 @@ impl<'a> Search<'a> {
         let mut parts = 0;
         let mut bound = f64::INFINITY;
         loop {
+            if self.best.is_some_and(|(distance, ..)| distance <= self.enough) {
+                bound = self.bound_of_the_rest(self.open.least());
+                break;
+            }
             let overlap = self.least() <= 0.0;
             let is_done = self.open.least().is_none_or(|bound| bound >= self.least() - self.tolerance);
             if overlap || is_done {
@@ -143,9 +156,7 @@ impl<'a> Search<'a> {
             }
             parts += batch.len() as u64;
             if parts > max_parts {
-                // Nothing is known about surfaces that wait.
-                let waiting = if self.waiting.is_empty() { f64::INFINITY } else { f64::NEG_INFINITY };
-                bound = batch.iter().map(|(bound, _)| *bound).fold(waiting, f64::min);
+                bound = self.bound_of_the_rest(batch.iter().map(|(bound, _)| *bound));
                 break;
             }
             let found: Vec<SearchedPart> = match batch.len() {
@@ -168,6 +179,13 @@ impl<'a> Search<'a> {
 
     fn least(&self) -> f64 {
         self.best.map_or(self.below, |(distance, ..)| distance)
+    }
+
+    /// Lower bound of what parts with these bounds and the surfaces that wait can have.
+    fn bound_of_the_rest(&self, bounds: impl IntoIterator<Item = f64>) -> f64 {
+        // Nothing is known about surfaces that wait.
+        let waiting = if self.waiting.is_empty() { f64::INFINITY } else { f64::NEG_INFINITY };
+        bounds.into_iter().fold(waiting, f64::min)
     }
 
     /// Signed distances of an order above this are not wanted.
