@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Tests the Python package with what takes long to install or to start: MJWarp, Newton, PyTorch, Ray,
-# Chromium, rerun, USD, and Vulkan's software driver; and the wheel without the GPU. Newton needs an
+# Tests the Python package with what takes long to install or to start: MJWarp, Newton, PyTorch, OMPL,
+# Ray, Chromium, rerun, USD, and Vulkan's software driver; and the wheel without the GPU. Newton needs an
 # older MuJoCo, so it has an environment of its own. `.ci/python.sh` has the tests of the package.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -41,6 +41,7 @@ in_release() {
         step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt &&
         step "MJWarp example" in_environment release $tests/unoptimised_kernels.py examples/python/mujoco_warp_nuts_on_bolts.py &&
         step "PyTorch example" in_environment release examples/python/peg_finds_hole.py &&
+        step "OMPL example" in_environment release examples/python/plan_with_ompl.py &&
         step "Ray example" in_environment release examples/python/ray_encode.py &&
         step "Ray example" in_environment release examples/python/ray_worlds.py &&
         # CUDA's replacement is for these tests only: Warp would take it, too.

@@ -52,7 +52,12 @@ impl<'py> Columns<'py> {
 
     /// The object of the class `name` of `tesdf.contacts`.
     pub fn build(self, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        self.py.import("tesdf.contacts")?.getattr(name)?.call((), Some(&self.named))
+        self.build_of("tesdf.contacts", name)
+    }
+
+    /// The object of the class `name` of a module.
+    pub fn build_of(self, module: &str, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.py.import(module)?.getattr(name)?.call((), Some(&self.named))
     }
 }
 

@@ -16,6 +16,7 @@ use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
 use tesdf::save::SaveError;
 use tesdf::verify::VerifyError;
 use tesdf_playback::PlaybackError;
+use tesdf_sim::planning::PlanningError;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::SceneError;
 use tesdf_sim::{DynamicsError, MassError, SimulateError};
@@ -53,6 +54,7 @@ pub enum Error {
     /// The run file that cannot be read or written.
     Record(PathBuf, RecordError),
     Playback(PlaybackError),
+    Planning(PlanningError),
     /// The run file, and a name that none of its bodies has.
     NoBody(PathBuf, String),
     Threads(rayon::ThreadPoolBuildError),
@@ -84,7 +86,9 @@ impl Error {
             },
             Self::Scene(SceneError::Read { ref source, .. })
             | Self::Record(_, RecordError::Read { ref source, .. }) => system(source, self.text()),
-            Self::Scene(_) | Self::NoBody(..) => new(py, "SceneError", self.text()),
+            Self::Scene(_) | Self::NoBody(..) | Self::Planning(PlanningError::Robot(_)) => {
+                new(py, "SceneError", self.text())
+            }
             Self::Simulate(_)
             | Self::Dynamics(_)
             | Self::World(..)
@@ -107,7 +111,9 @@ impl Error {
             Self::Choice(_) | Self::Domain(_) | Self::Encode(..) => new(py, "EncodeError", self.text()),
             Self::Deform(_) => new(py, "DeformError", self.text()),
             Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
-            Self::Collide(_) | Self::CollideAt(..) => new(py, "CollideError", self.text()),
+            Self::Collide(_) | Self::CollideAt(..) | Self::Planning(_) => {
+                new(py, "CollideError", self.text())
+            }
             Self::Threads(_) => PyOSError::new_err(self.text()),
             Self::TooManyThreads(..) => PyValueError::new_err(self.text()),
             #[cfg(feature = "gpu")]
@@ -155,6 +161,7 @@ impl Error {
             Self::Record(_, e @ (RecordError::Save(_) | RecordError::Read { .. })) => e.to_string(),
             Self::Record(path, e) => format!("{}: {e}", path.display()),
             Self::Playback(e) => e.to_string(),
+            Self::Planning(e) => e.to_string(),
             Self::NoBody(path, body) => format!("{}: there is no body {body}", path.display()),
             Self::Threads(e) => format!("cannot start threads: {e}"),
             Self::TooManyThreads(asked, most) => format!("threads: {asked}; expected at most {most}"),

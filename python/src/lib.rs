@@ -26,6 +26,7 @@ mod playback;
 mod polygons;
 mod pool;
 mod poses;
+mod robot;
 mod scene;
 mod settings;
 mod shapes;
@@ -57,6 +58,8 @@ mod _native {
     use super::playback::{export, view};
     #[pymodule_export]
     use super::polygons::polygons;
+    #[pymodule_export]
+    use super::robot::Robot;
     #[pymodule_export]
     use super::scene::Scene;
     #[pymodule_export]

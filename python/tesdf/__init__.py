@@ -33,6 +33,11 @@
     kept = tesdf.InstancePairs()                        # kept.detect(scene): less work where most bodies rest
     tracker = tesdf.PatchTracker()                      # tracker.update(scene, contacts): regions with lasting ids
 
+    robot = tesdf.Robot("arm.urdf")                     # for planners, in metres
+    robot.add_obstacle("part", "part.stl", pose)        # set_allowed("tool", "part")
+    robot.clearance(q).gradient, robot.in_collision(q)  # clearances and are_in_collision for q [N, dof]
+    robot.check_motion(q0, q1).verdict                  # of the whole line, certainly: "free", "collision"
+
     tesdf.devices()                                     # GPUs, if the package was built with them
     scene.detect(device="gpu")                          # and asset.query(points, device="gpu"), Simulation
 
@@ -56,6 +61,7 @@ from ._native import (
     DeviceArray,
     InstancePairs,
     PatchTracker,
+    Robot,
     Scene,
     Simulation,
     Snapshot,
@@ -96,6 +102,7 @@ from .errors import (
     SimulationError,
 )
 from .managers import CollisionManager, ContactData, DistanceData
+from .planning import MotionCheck, MotionChecks, RobotClearance, RobotClearances
 from .playback import LiveView, export
 from .queries import closest_point, contains, signed_distance
 from .reports import (
@@ -151,6 +158,8 @@ __all__ = [
     "JointForces",
     "LiveView",
     "MeshError",
+    "MotionCheck",
+    "MotionChecks",
     "Moved",
     "NotSolidError",
     "PatchTracker",
@@ -161,6 +170,9 @@ __all__ = [
     "Reencoded",
     "RepairReport",
     "Repaired",
+    "Robot",
+    "RobotClearance",
+    "RobotClearances",
     "Scene",
     "SceneError",
     "Simulation",

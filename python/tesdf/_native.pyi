@@ -21,6 +21,7 @@ from .contacts import (
     StepContacts,
     TouchingFeatures,
 )
+from .planning import MotionCheck, MotionChecks, RobotClearance, RobotClearances
 from .playback import LiveView
 from .reports import (
     Certificate,
@@ -60,6 +61,7 @@ __all__ = [
     "DeviceArray",
     "InstancePairs",
     "PatchTracker",
+    "Robot",
     "Scene",
     "Simulation",
     "Snapshot",
@@ -326,6 +328,109 @@ class Asset:
         """All arrays of the file by name, as read-only views without a copy. Each view keeps the asset
         alive."""
     def __reduce__(self) -> tuple[Callable[[bytes], Asset], tuple[bytes]]: ...
+@final
+class Robot:
+    def __new__(
+        cls,
+        file: _Path,
+        *,
+        pose: npt.ArrayLike | None = None,
+        packages: dict[str, _Path] | None = None,
+        repair: Literal["auto", "never"] = "never",
+        ignore: Sequence[str] | None = None,
+    ) -> Robot: ...
+    def add_obstacle(
+        self,
+        name: str,
+        shape: Body,
+        pose: npt.ArrayLike | None = None,
+        *,
+        scale: float = 1.0,
+    ) -> None:
+        """Adds an obstacle.
+
+        - name: that no other body has.
+        - shape: an Asset, Plane, Box, Sphere or Capsule, or a mesh, which is encoded once.
+        - pose: [7] or [4, 4]; None is that of the world.
+        - scale: metres for each unit of the shape."""
+    def move_obstacle(self, name: str, pose: npt.ArrayLike) -> None:
+        """Sets the pose of an obstacle: [7], x y z qx qy qz qw, or [4, 4]."""
+    def remove_obstacle(self, name: str) -> None:
+        """Removes an obstacle."""
+    def set_allowed(self, a: str, b: str, allowed: bool = True) -> None:
+        """Sets whether two bodies may collide, by their names: links or a link and an obstacle. Nothing is
+        looked at between those that may.
+
+        Raises CollideError for a name that no body has."""
+    def clearance(self, q: npt.ArrayLike, *, tolerance: float = 1e-6) -> RobotClearance:
+        """The clearance at a configuration q [dof]: RobotClearance, with the pair that is nearest, its
+        witness points and the gradient by q.
+
+        tolerance bounds the error, m."""
+    def clearances(
+        self, q: npt.ArrayLike, *, tolerance: float = 1e-6, threads: int | None = None
+    ) -> RobotClearances:
+        """The clearances at many configurations q [N, dof], on all threads: RobotClearances. The result
+        does not depend on threads; None is one per core."""
+    def is_clearance_below(self, q: npt.ArrayLike, bound: float, *, tolerance: float = 1e-6) -> bool:
+        """Whether the clearance at a configuration q [dof] is below a bound, m. False is certain. True
+        says that it is below bound + tolerance. Takes less time than the clearance."""
+    def are_clearances_below(
+        self, q: npt.ArrayLike, bound: float, *, tolerance: float = 1e-6, threads: int | None = None
+    ) -> npt.NDArray[np.bool_]:
+        """As is_clearance_below, at many configurations q [N, dof], on all threads: bool [N]."""
+    def in_collision(self, q: npt.ArrayLike, *, tolerance: float = 1e-6) -> bool:
+        """Whether bodies collide at a configuration q [dof]: whether the clearance is below 0, up to the
+        tolerance, m. False is certain."""
+    def are_in_collision(
+        self, q: npt.ArrayLike, *, tolerance: float = 1e-6, threads: int | None = None
+    ) -> npt.NDArray[np.bool_]:
+        """As in_collision, at many configurations q [N, dof], on all threads: bool [N]."""
+    def check_motion(
+        self,
+        q0: npt.ArrayLike,
+        q1: npt.ArrayLike,
+        *,
+        margin: float = 0.0,
+        tolerance: float = 1e-4,
+        steps: int = 100_000,
+    ) -> MotionCheck:
+        """Checks the straight line between the configurations q0 [dof] and q1 [dof] as a whole:
+        MotionCheck, whose verdict is "free", "collision" or "undecided". The first two are certain:
+        nothing between samples is missed. Coordinates are not wrapped.
+
+        - margin: the clearance to keep, m.
+        - tolerance: the motion is undecided only where its clearance is above the margin by less than
+          twice this, m, or after
+        - steps: intervals of pairs of bodies that are looked at."""
+    def check_motions(
+        self,
+        q0: npt.ArrayLike,
+        q1: npt.ArrayLike,
+        *,
+        margin: float = 0.0,
+        tolerance: float = 1e-4,
+        steps: int = 100_000,
+        threads: int | None = None,
+    ) -> MotionChecks:
+        """Checks the motions from the rows of q0 [N, dof] to those of q1 [N, dof], as check_motion, on all
+        threads: MotionChecks."""
+    def poses(self, q: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """The poses [L, 7] of the links at a configuration q [dof], x y z qx qy qz qw, in the world. Links
+        are the first of `bodies`."""
+    @property
+    def joints(self) -> list[str]:
+        """Names of the joints of a configuration, in its order."""
+    @property
+    def limits(self) -> npt.NDArray[np.float64]:
+        """Limits [dof, 2] of the joints, rad or m; infinite where the file has none."""
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the bodies: the links of the robot in the order of the file, then the obstacles."""
+    @property
+    def checked_pairs(self) -> list[tuple[str, str]]:
+        """The pairs of bodies that are looked at, by their names."""
+
 @final
 class Scene:
     def __new__(cls) -> Scene: ...

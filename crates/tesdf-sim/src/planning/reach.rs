@@ -76,3 +76,75 @@ pub(super) fn way(
     }
     way
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::{Base, Link, Motion, Robot as Description, RobotJoint};
+    use tesdf::glam::DQuat;
+
+    /// A chain of joints in random places, each of which moves a link.
+    fn chain(random: &mut fastrand::Rng, joints: usize) -> Chain {
+        let mut vector = |size: f64| DVec3::from_array([0; 3].map(|_| size * (2.0 * random.f64() - 1.0)));
+        let links = (0..=joints).map(|k| {
+            let rotation = DQuat::from_rotation_arc(DVec3::Z, vector(1.0).normalize());
+            let joint = RobotJoint {
+                name: format!("{k}"),
+                parent: k.saturating_sub(1),
+                motion: if k % 3 == 2 { Motion::Slider } else { Motion::Hinge },
+                pose: Pose { translation: vector(0.5), rotation },
+                anchor: vector(0.2),
+                axis: vector(1.0),
+                limits: None,
+                damping: 0.0,
+                friction: 0.0,
+                armature: 0.0,
+                effort: None,
+            };
+            let root = Base::Root { pose: Pose::IDENTITY, is_fixed: Some(true) };
+            Link {
+                name: format!("{k}"),
+                place: String::new(),
+                base: if k == 0 { root } else { Base::Joint(joint) },
+                mass: None,
+                collisions: Vec::new(),
+                friction: None,
+                groups: [1; 2],
+            }
+        });
+        let file = Description { links: links.collect(), ..Description::default() };
+        Chain::new(&file, Pose::IDENTITY, &[]).unwrap()
+    }
+
+    #[test]
+    fn no_point_goes_farther_than_the_bound() {
+        let mut random = fastrand::Rng::with_seed(2);
+        let (mut most, mut greater) = (0.0_f64, 0);
+        for case in 0..300 {
+            let joints = 1 + case % 6;
+            let chain = chain(&mut random, joints);
+            let shape = Shape::Box { half_extents: DVec3::new(0.1, 0.05, 0.2) };
+            let hull = Hull::new(&shape, Pose::at(DVec3::new(0.1, 0.0, 0.3)));
+            let size = [0.01, 0.3, 3.0][case % 3];
+            let mut number = |size: f64| size * (2.0 * random.f64() - 1.0);
+            let middle: Vec<f64> = (0..joints).map(|_| number(3.0)).collect();
+            let speed: Vec<f64> = (0..joints).map(|_| number(size)).collect();
+            let poses = chain.poses(&middle);
+            let placed = hull.placed(poses[joints]);
+            let bound = way(&chain, &poses, &chain.above[joints], &placed, |k| speed[k].abs());
+            let mut moved = 0.0_f64;
+            for k in -40..=40 {
+                let t = f64::from(k) / 40.0;
+                let q: Vec<f64> = middle.iter().zip(&speed).map(|(q, v)| q + t * v).collect();
+                let there = hull.placed(chain.poses(&q)[joints]);
+                let ways = there.points.iter().zip(&placed.points).map(|(p, q)| p.distance(*q));
+                moved = ways.fold(moved, f64::max);
+            }
+            assert!(moved <= bound * (1.0 + 1e-12), "{case}: {moved} {bound}");
+            most = most.max(moved / bound);
+            greater += usize::from(bound > 20.0 * moved);
+        }
+        // The bound is attained by one joint, and is never absurd.
+        assert!(most > 0.99 && greater < 10, "{most} {greater}");
+    }
+}

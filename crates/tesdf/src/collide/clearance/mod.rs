@@ -306,8 +306,7 @@ impl<'a> Pair<'a> {
         const FAR: f64 = 1e15;
         let far = |body: &Body, field: &FieldBody| {
             let p = field.to_field(body.placement.pose.translation);
-            // A number that is none is far, too.
-            !(p.abs().max_element() <= FAR)
+            p.is_nan() || p.abs().max_element() > FAR
         };
         let is_far = [Surface::A, Surface::B].iter().any(|&of| far(self.body(of), &self.field(of)));
         match is_far && !self.surfaces().iter().all(|(_, order)| order.has_distances()) {
