@@ -309,7 +309,7 @@ impl<'a> Checked<'a> {
         let options = LeastClearanceOptions { below: needed + slack, enough: margin, tolerance: slack };
         let found = least_clearance(self.scene, &robot.pairs[pair..=pair], &options)?;
         let lower = found.lower_bound;
-        let distance = found.nearest.map_or(lower, |(_, clearance)| clearance.distance);
+        let distance = found.nearest.map_or(f64::INFINITY, |(_, clearance)| clearance.distance);
         if found.nearest.is_some() && distance <= margin {
             return Ok(Looked::At(MotionVerdict::Collision, self.told(pair, middle, distance)));
         }

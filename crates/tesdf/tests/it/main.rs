@@ -36,6 +36,7 @@ mod inside_rules;
 mod inside_rules_contacts;
 mod inside_rules_open;
 mod instance_pairs;
+mod least_clearance;
 mod looking_ahead;
 mod mesh_check;
 mod mesh_fill_holes;
