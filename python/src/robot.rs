@@ -40,8 +40,8 @@ const NO_BODY: u32 = u32::MAX;
 ///   shapes or joints in a way that is not read are an error otherwise.
 ///
 /// A configuration q [dof] has a number for each of `joints`, which turn or slide and follow no other
-/// joint: rad or m, also beyond `limits`. Boxes, spheres and capsules of links are exact; a cylinder
-/// is a prism of 64 faces around it, up to 0.12 % of its radius outside of it.
+/// joint: rad or m, also beyond `limits`. Boxes, spheres, capsules and cylinders of links are
+/// exact.
 ///
 /// Looked at are all pairs of a link and an obstacle and of two links, but those that never move
 /// against each other, those that a joint connects, those that the file keeps apart, and those that

@@ -99,9 +99,8 @@ struct Body {
 }
 
 impl Robot {
-    /// Reads the URDF or MJCF file at `path` and encodes the meshes of its links. Boxes, spheres and
-    /// capsules are exact. A cylinder is a prism of 64 faces around it, up to 0.12 % of the radius
-    /// outside of it.
+    /// Reads the URDF or MJCF file at `path` and encodes the meshes of its links. Boxes, spheres,
+    /// capsules and cylinders are exact.
     ///
     /// # Errors
     /// [`PlanningError::Robot`] with the place in the file, or the link whose mesh cannot be encoded.

@@ -109,6 +109,7 @@ mod tests {
                 mass: None,
                 collisions: Vec::new(),
                 friction: None,
+                friction_torsional: None,
                 groups: [1; 2],
             }
         });

@@ -1,17 +1,15 @@
 //! Shapes of links.
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 use tesdf::base::Inside;
 use tesdf::collide::Shape;
 use tesdf::encode::{EncodeError, Encoder, Preset};
-use tesdf::glam::DVec3;
 use tesdf::mesh::{RepairMode, SolidMesh};
 use tesdf::{Progress, TeSdf};
 
 use super::error::PlanningError;
 use crate::robot::Geometry;
-use crate::scene_file::{AROUND, AssetCache, PartSection, PartShape, joined};
+use crate::scene_file::{AssetCache, PartSection, joined};
 
 /// The shape of a geometry of a link, in its frame.
 ///
@@ -24,20 +22,16 @@ pub(super) fn shape_of(
     assets: Option<&AssetCache>,
     progress: &Progress,
 ) -> Result<Shape, PlanningError> {
-    let (mesh, shape, scale) = match geometry {
+    let (file, scale) = match geometry {
         &Geometry::Box { half_extents } => return Ok(Shape::Box { half_extents }),
         &Geometry::Sphere { radius } => return Ok(Shape::Sphere { radius }),
         &Geometry::Capsule { half_height, radius } => return Ok(Shape::Capsule { half_height, radius }),
-        &Geometry::Cylinder { half_height, radius } => {
-            // The middles of its faces are on the cylinder, so none of it is outside.
-            let radius = radius / (PI / AROUND as f64).cos();
-            (None, Some(PartShape::Cylinder { half_height, radius }), DVec3::ONE)
-        }
-        Geometry::Mesh { file, scale } => (Some(file.clone()), None, *scale),
+        &Geometry::Cylinder { half_height, radius } => return Ok(Shape::Cylinder { half_height, radius }),
+        Geometry::Mesh { file, scale } => (file, scale),
     };
     let part = PartSection {
-        mesh,
-        shape,
+        mesh: Some(file.clone()),
+        shape: None,
         scale: scale.to_array(),
         translation: [0.0; 3],
         rotation: [0.0, 0.0, 0.0, 1.0],

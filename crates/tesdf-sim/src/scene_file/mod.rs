@@ -85,7 +85,7 @@ pub use asset_cache::AssetCache;
 pub use copies::CopiesSection;
 pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
-pub(crate) use parts::{AROUND, joined};
+pub(crate) use parts::joined;
 pub use parts::{PartSection, PartShape};
 pub use place::PoseSection;
 pub use read::LoadedScene;

@@ -12,7 +12,7 @@ use tesdf::mesh::{RepairMode, SolidMesh, TriangleMesh};
 use super::{PoseSection, identity};
 
 /// Faces around the axis of a round part.
-pub(crate) const AROUND: usize = 64;
+const AROUND: usize = 64;
 
 /// A part of a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

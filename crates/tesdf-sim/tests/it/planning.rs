@@ -1,6 +1,6 @@
 //! Robots for planners: clearances against those of all pairs and against samples, derivatives against
 //! differences, motions against dense samples, and what is refused.
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -136,22 +136,6 @@ fn joints_that_follow_others_are_no_numbers_of_a_configuration() {
     assert!(fingers("joint='right'").expect_err("a circle").to_string().contains("follows itself"));
 }
 
-/// A prism of 64 faces around a cylinder.
-fn prism(half_height: f64, radius: f64) -> TriangleMesh {
-    let around = radius / (PI / 64.0).cos();
-    let ring = |z: f64| (0..64).map(move |k| (TAU * f64::from(k) / 64.0, z));
-    let mut vertices: Vec<_> = ring(-half_height)
-        .chain(ring(half_height))
-        .map(|(angle, z)| DVec3::new(around * angle.cos(), around * angle.sin(), z))
-        .collect();
-    vertices.extend([DVec3::new(0.0, 0.0, -half_height), DVec3::new(0.0, 0.0, half_height)]);
-    let faces = (0..64u32).flat_map(|k| {
-        let next = (k + 1) % 64;
-        [[k, next, 64 + next], [k, 64 + next, 64 + k], [128, next, k], [129, 64 + k, 64 + next]]
-    });
-    TriangleMesh::new(vertices, faces.collect()).unwrap()
-}
-
 /// The arm's shapes by link, in the world.
 struct Posed {
     scene: Scene,
@@ -168,7 +152,7 @@ impl Posed {
             for part in &link.collisions {
                 let shape = match part.geometry {
                     Geometry::Box { half_extents } => Shape::Box { half_extents },
-                    Geometry::Cylinder { half_height, radius } => asset(prism(half_height, radius)).into(),
+                    Geometry::Cylinder { half_height, radius } => Shape::Cylinder { half_height, radius },
                     ref other => panic!("{other:?}"),
                 };
                 let shape = scene.add_shape(shape).unwrap();

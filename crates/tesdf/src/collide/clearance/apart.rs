@@ -92,7 +92,7 @@ impl Pair<'_> {
     pub(super) fn rough_bound(&self, enough: f64) -> f64 {
         // No point of one solid is near the other one, so none of its surface, and no surface of the
         // other one is within it.
-        let first = self.first();
+        let first = self.with_fewer_faces();
         let Some(whole) = Boxed::new(self.body(first)) else { return f64::NEG_INFINITY };
         let field = self.field(first);
         let small = SMALL * whole.radius();

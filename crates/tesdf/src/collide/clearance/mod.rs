@@ -268,14 +268,21 @@ impl<'a> Pair<'a> {
         self.least(vec![(first, self.field(first).without_jump())], tolerance)
     }
 
-    /// The body with fewer faces. The round side of a cylinder is searched in parts that get ever
-    /// flatter, so that of the other body comes first. A plane never does, because it has no finite
-    /// surface.
+    /// The body whose surface is searched first: that with fewer faces. The round side of a cylinder is
+    /// searched in parts that get ever flatter, so the surface of the other body comes before it.
     fn first(&self) -> Surface {
+        let first = self.with_fewer_faces();
+        match (self.body(first).shape, self.body(first.other()).shape) {
+            (Shape::Cylinder { .. }, other) if !matches!(other, Shape::Plane) => first.other(),
+            _ => first,
+        }
+    }
+
+    /// The body with fewer faces. A plane never is, because it has no finite surface.
+    fn with_fewer_faces(&self) -> Surface {
         let faces = |body: &Body| match body.shape {
             Shape::Mesh(asset) => asset.face_count(),
             Shape::Plane => usize::MAX,
-            Shape::Cylinder { .. } => usize::MAX - 1,
             _ => 0,
         };
         if faces(&self.b) < faces(&self.a) { Surface::B } else { Surface::A }
