@@ -24,6 +24,6 @@ step "Python: devices" in_environment env -m pytest python/tests/test_device.py 
 step "Python: stubs" in_environment env -m mypy.stubtest tesdf --allowlist python/tests/stubtest-allowlist.txt \
     --mypy-config-file python/tests/mypy.ini
 # Each example checks what it shows.
-for example in furniture_leg grasp_check inspect_asset mujoco_nut_on_bolt mujoco_peg_in_hole plan_around_part push_worlds rl_batch; do
+for example in arm_inserts_peg furniture_leg grasp_check inspect_asset mujoco_nut_on_bolt mujoco_peg_in_hole plan_around_part push_worlds rl_batch; do
     step "Python: examples" in_environment env "examples/python/$example.py"
 done
