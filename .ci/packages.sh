@@ -16,6 +16,12 @@ folder=$(mktemp -d "$PWD/target/packages/XXXXXX")
 trap 'rm -rf "$folder"' EXIT
 step "packages" cargo package --quiet --allow-dirty --target-dir "$folder" --no-verify --workspace --exclude tesdf-python
 
+# Each package has the texts of its licences.
+for package in "$folder"/package/*.crate; do
+    tar -tzf "$package" | grep -c '/LICENSE-\(APACHE\|MIT\)$' | grep -qx 2 ||
+        { echo "error: $(basename "$package") lacks the text of a licence" >&2; exit 1; }
+done
+
 # One workspace of the packaged files. Checked, not built as `cargo package` would: the compiled code
 # never runs.
 version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml)
