@@ -21,6 +21,7 @@ mod encoder;
 mod error;
 pub(crate) mod filter;
 mod hints;
+mod json;
 mod list_proof;
 pub(crate) mod lists;
 mod pipeline;
@@ -53,6 +54,7 @@ pub use crate::asset::options::{
 pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, EncoderChoice, InsideChoice};
 pub use encoder::{EncodeFileError, Encoder};
 pub use error::EncodeError;
+pub use json::{ExportJsonError, ImportJsonError};
 pub use roots::Domain;
 pub use sampled::{Processor, SampledCell, Sampler};
 pub use surface::Surface;

@@ -57,6 +57,7 @@ mod save;
 mod scene_edges;
 mod structure;
 mod support;
+mod tes_json;
 mod tetrahedra_read;
 mod time_of_impact;
 mod too_many_intersections;

@@ -1,0 +1,222 @@
+//! JSON files of TES-Encoder: a file that was written by hand, assets that are written and read
+//! again, and files that are damaged.
+use std::ops::ControlFlow;
+
+use serde_json::{Value, json};
+
+use crate::support::random::Random;
+use crate::support::tetrahedra::grid;
+use tesdf::domain::ConformingMesh;
+use tesdf::encode::{Domain, EncodeOptions, Encoder, ImportJsonError, Refinement};
+use tesdf::glam::DVec3;
+use tesdf::verify::{ProveOptions, prove};
+use tesdf::{Preset, Source, TeSdf};
+
+/// A tetrahedron with three right angles, and another over its slanted face.
+fn by_hand() -> Value {
+    json!({
+        "num_of_surface_nodes": 4, "num_of_inner_nodes": 0, "num_of_outer_nodes": 1, "num_of_faces": 4,
+        "num_of_surface_inner_tetras": 1, "num_of_inner_tetras": 0, "num_of_surface_outer_tetras": 1,
+        "num_of_outer_tetras": 0,
+        "surface_nodes": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        "inner_nodes": [], "outer_nodes": [[1.0, 1.0, 1.0]],
+        "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        "surface_inner_tetras": [[0, 1, 3, 2]], "inner_tetras": [],
+        "surface_outer_tetras": [[1, 2, 3, 4]], "outer_tetras": [],
+        "nums_of_encoded_faces_surface_inner": [4], "encoded_faces_surface_inner": [3, 2, 1, 0],
+        "nums_of_encoded_faces_inner": [], "encoded_faces_inner": [],
+        "nums_of_encoded_faces_surface_outer": [1], "encoded_faces_surface_outer": [[2]],
+        "nums_of_encoded_faces_outer": [], "encoded_faces_outer": [],
+        "a key of another program": {"version": [1, [2]]},
+    })
+}
+
+fn import(file: &Value) -> Result<TeSdf, ImportJsonError> {
+    TeSdf::import_json_bytes(file.to_string().as_bytes(), &Source::default())
+}
+
+#[test]
+fn a_file_by_hand_answers_from_its_lists() {
+    let mut file = by_hand();
+    let asset = import(&file).unwrap();
+    let certificate = asset.about().certificate();
+    assert_eq!((certificate.delta(), certificate.domain()), (None, "conforming"));
+    assert!(certificate.encoder().contains("TES-Encoder"), "{}", certificate.encoder());
+    let (inside, outside) = (DVec3::splat(0.1), DVec3::splat(0.5));
+    assert!((asset.signed_distance(inside) + 0.1).abs() < 1e-15);
+    assert!((asset.signed_distance(outside) - 0.5 / 3.0_f64.sqrt()).abs() < 1e-15);
+    let proof =
+        |asset: &TeSdf| prove(asset, &ProveOptions::default(), |_| ControlFlow::Continue(())).unwrap();
+    assert!(proof(&asset).proved, "{:?}", proof(&asset).faults);
+
+    // The corners may be in the other order, and the lists nested or flat.
+    file["surface_inner_tetras"] = json!([[0, 1, 2, 3]]);
+    file["surface_outer_tetras"] = json!([[2, 1, 3, 4]]);
+    file["encoded_faces_surface_inner"] = json!([[0, 1, 2, 3]]);
+    file["encoded_faces_surface_outer"] = json!([2]);
+    assert_eq!(import(&file).unwrap().signed_distance(outside), asset.signed_distance(outside));
+
+    // A list that misses the nearest face is kept, and the proof finds it.
+    file["encoded_faces_surface_outer"] = json!([0]);
+    let asset = import(&file).unwrap();
+    let off = DVec3::new(0.4, 0.4, 0.5).distance(DVec3::new(0.4, 0.4, 0.0));
+    assert_eq!(asset.signed_distance(DVec3::new(0.4, 0.4, 0.5)), off);
+    let found = proof(&asset);
+    assert_eq!((found.proved, found.distances.refuted), (false, 1));
+}
+
+/// An asset of a block in a grid of tetrahedra.
+fn block(refinement: Refinement) -> TeSdf {
+    let l = |x, y, z| (1..4).contains(&x) && (1..3).contains(&z) && (y == 1 || (x < 3 && y == 2));
+    let (solid, tetrahedra) = grid(5, 0.15, l);
+    let domain = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
+    let options = EncodeOptions { refinement, byte_worth: 0.02, ..EncodeOptions::preset(Preset::Fast) };
+    Encoder::new().options(options).domain(Domain::Conforming(&domain)).encode(&solid).unwrap()
+}
+
+/// The lists of all cells, by the corners of the cells.
+fn lists(asset: &TeSdf) -> Vec<(Vec<[u64; 3]>, Vec<u32>)> {
+    let mut lists = Vec::new();
+    asset.visit_cells(|cell| {
+        let mut corners = cell.corners.map(|p| p.to_array().map(f64::to_bits)).to_vec();
+        corners.sort_unstable();
+        lists.push((corners, asset.list_of(cell.id)));
+    });
+    lists.sort_unstable();
+    lists
+}
+
+#[test]
+fn what_is_written_and_read_again_answers_the_same() {
+    for refinement in [Refinement::None, Refinement::ByCost] {
+        let asset = block(refinement);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("block.json");
+        asset.export_json(&path).unwrap();
+        let again = TeSdf::import_json(&path).unwrap();
+        assert_eq!(again.about().source.name, "block.json");
+        assert_eq!(again.classes(), asset.classes());
+        if refinement == Refinement::None {
+            assert!(lists(&again) == lists(&asset), "lists differ");
+        }
+        let mut random = Random(7);
+        for _ in 0..3000 {
+            let p = 2.5 + 3.5 * random.in_cube();
+            let (a, b) = (asset.query(p), again.query(p));
+            assert!((a.signed_distance - b.signed_distance).abs() < 1e-14, "{p}: {a:?}, {b:?}");
+            assert!(a.gradient.distance(b.gradient) < 1e-9 || a.face != b.face, "{p}: {a:?}, {b:?}");
+        }
+        // Corners are in negative order.
+        let file: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        let mut nodes: Vec<DVec3> = Vec::new();
+        for key in ["surface_nodes", "inner_nodes", "outer_nodes"] {
+            let found: Vec<[f64; 3]> = serde_json::from_value(file[key].clone()).unwrap();
+            nodes.extend(found.into_iter().map(DVec3::from_array));
+        }
+        for group in ["surface_inner", "inner", "surface_outer", "outer"] {
+            let corners: Vec<[usize; 4]> =
+                serde_json::from_value(file[format!("{group}_tetras")].clone()).unwrap();
+            assert_eq!(file[format!("num_of_{group}_tetras")], corners.len());
+            for t in corners {
+                let [a, b, c, d] = t.map(|v| nodes[v]);
+                assert!((b - a).cross(c - a).dot(d - a) < 0.0, "{group}: {t:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_bisection_domain_is_not_written() {
+    let (solid, _) = grid(3, 0.1, |x, y, z| (x, y, z) == (1, 1, 1));
+    let asset = Encoder::new().preset(Preset::Fast).encode(&solid).unwrap();
+    let error = asset.to_json_bytes().unwrap_err().to_string();
+    assert!(error.contains("--domain gmsh"), "{error}");
+}
+
+#[test]
+fn errors_name_the_key_and_the_place() {
+    let changed = |key: &str, value: Value| {
+        let mut file = by_hand();
+        file[key] = value;
+        import(&file).unwrap_err().to_string()
+    };
+    for (key, value, expected) in [
+        ("num_of_faces", json!(5), "num_of_faces: 5, expected 4"),
+        ("num_of_faces", json!(-5), "num_of_faces: "),
+        ("num_of_outer_tetras", json!(1e300), "num_of_outer_tetras: "),
+        ("faces", json!([[0, 2, 1], [0, 1, 4]]), "faces[1]: node 4, expected below 4"),
+        ("faces", json!([[0, 2, 1], [0, 1]]), "faces[1]: "),
+        ("faces", json!([[0, 2, 1], [0, 1, 3, 2]]), "faces[1]: "),
+        ("faces", json!([[0, 2, 1]]), "num_of_faces: 4, expected 1"),
+        ("surface_inner_tetras", json!([[0, 1, 2, 5]]), "surface_inner_tetras[0]: node 5, expected below 5"),
+        ("surface_inner_tetras", json!([[0, 1, 2, 4294967296_u64]]), "surface_inner_tetras[0]: "),
+        ("surface_inner_tetras", json!("text"), "surface_inner_tetras: "),
+        ("surface_nodes", json!([[0, 0, 0], [1, 0, null]]), "surface_nodes[1]: "),
+        (
+            "encoded_faces_surface_inner",
+            json!([0, 1, 2, 4]),
+            "encoded_faces_surface_inner[3]: face 4, expected below 4",
+        ),
+        ("encoded_faces_surface_inner", json!([[0, 1, 2, 4]]), "encoded_faces_surface_inner[0]: face 4"),
+        ("encoded_faces_surface_inner", json!([0, 1, 2]), "encoded_faces_surface_inner: 3 faces, expected 4"),
+        ("encoded_faces_surface_inner", json!([0, [1, 2]]), "encoded_faces_surface_inner[1]: "),
+        ("encoded_faces_surface_inner", json!([[0, [1], 2]]), "encoded_faces_surface_inner[0]: "),
+        (
+            "encoded_faces_surface_inner",
+            json!([[0], [1, 2]]),
+            "nums_of_encoded_faces_surface_inner[0]: 4, expected 1",
+        ),
+        (
+            "nums_of_encoded_faces_surface_inner",
+            json!([1, 3]),
+            "nums_of_encoded_faces_surface_inner: 2 numbers, expected 1",
+        ),
+        (
+            "nums_of_encoded_faces_surface_outer",
+            json!([0]),
+            "nums_of_encoded_faces_surface_outer[0]: 0, expected 1",
+        ),
+        ("surface_outer_tetras", json!([[0, 1, 2, 4]]), "orientation"),
+    ] {
+        let error = changed(key, value);
+        assert!(error.contains(expected) || expected == "orientation", "{key}: {error}; expected {expected}");
+    }
+    let mut file = by_hand();
+    file["surface_inner_tetras"] = file["surface_outer_tetras"].clone();
+    file["surface_outer_tetras"] = json!([[0, 1, 2, 3]]);
+    let error = import(&file).unwrap_err().to_string();
+    assert!(error.contains("surface_inner_tetras[0]: a tetrahedron outside"), "{error}");
+    for key in ["surface_nodes", "outer_nodes", "faces", "inner_tetras", "encoded_faces_surface_outer"] {
+        let mut file = by_hand();
+        file.as_object_mut().unwrap().remove(key);
+        assert!(import(&file).unwrap_err().to_string().contains(key), "{key}");
+    }
+    let error = TeSdf::import_json("/nowhere/a.json").unwrap_err().to_string();
+    assert!(error.contains("/nowhere/a.json"), "{error}");
+}
+
+#[test]
+fn damaged_text_is_refused() {
+    let text = by_hand().to_string();
+    let import = |text: &str| TeSdf::import_json_bytes(text.as_bytes(), &Source::default());
+    assert!(import(&text).is_ok());
+    for end in 0..text.len() {
+        let error = import(&text[..end]).expect_err("it is cut short").to_string();
+        assert!(error.len() > 20, "{error}");
+    }
+    // Any number may have any value.
+    let bytes = text.as_bytes();
+    let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
+    for huge in ["4294967295", "18446744073709551615", "1e999", "-1", "NaN", "[[[[1]]]]", "\"1\""] {
+        for &at in &digits {
+            let _ = import(&format!("{}{huge}{}", &text[..at], &text[at + 1..]));
+        }
+    }
+    let deep = |n: usize| format!("{{\"x\":{}", "[".repeat(n));
+    assert!(import(&deep(1_000_000)).unwrap_err().to_string().contains("recursion"));
+    let deep = format!("{{\"inner_tetras\":{}", "[".repeat(1_000_000));
+    assert!(import(&deep).unwrap_err().to_string().contains("inner_tetras[0]"));
+    let twice = text.replacen('{', "{\"faces\":[],", 1);
+    assert!(import(&twice).unwrap_err().to_string().contains("faces is given twice"));
+    assert!(import(&(text + "{}")).is_err());
+}
