@@ -1,4 +1,5 @@
-//! `tesdf export RUN -o run.glb`: a recorded run as an animated GLB file.
+//! `tesdf export RUN -o run.glb`: a recorded run as an animated GLB file. `tesdf export FILE.tesdf
+//! -o FILE.json`: an asset as JSON of TES-Encoder.
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -8,14 +9,15 @@ use crate::terminal::parse;
 use crate::terminal::report::{self, Failure, Outcome};
 use tesdf_playback::{Frames, GlbOptions, Playback, glb};
 
+use crate::export_json;
 use crate::open_run::{self, OpenRun};
 
 /// Arguments of `tesdf export`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The run, which `tesdf simulate` wrote
+    /// The run, which `tesdf simulate` wrote; or a .tesdf file with a conforming domain
     pub run: PathBuf,
-    /// Output GLB file; an existing file is replaced, a pipe or device is written to
+    /// Output GLB file, or JSON file of TES-Encoder for a .tesdf file; an existing file is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "GLB")]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
@@ -55,11 +57,14 @@ impl FrameArgs {
     }
 }
 
-/// Writes the run as a GLB file.
+/// Writes the run as a GLB file, or the asset as JSON.
 ///
 /// # Errors
-/// The run or a geometry cannot be opened, a state is not valid, or the file cannot be written.
+/// The asset cannot be opened or has no conforming domain. The run or a geometry cannot be opened, a state is not valid, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    if args.run.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("tesdf")) {
+        return export_json::run(args);
+    }
     let interrupted = interrupt::flag();
     let OpenRun { record, system, output, .. } =
         open_run::open(&args.run, &args.geometries, &args.output, args.consent, interrupted)?;

@@ -21,6 +21,8 @@ pub mod devices;
 pub mod encode;
 pub mod encode_all;
 pub mod export;
+mod export_json;
+pub mod import;
 pub mod inspect;
 mod open_run;
 pub mod part;
@@ -60,6 +62,8 @@ pub enum Command {
     Encode(encode::Args),
     /// Encode all meshes of a folder or a list, each into a .tesdf file
     EncodeAll(encode_all::Args),
+    /// Make a .tesdf file of a JSON file of TES-Encoder, with its lists as they are
+    Import(import::Args),
     /// Print signed distance, gradient and closest point at the points of a CSV file
     Query(query::Args),
     /// Print the contents of a .tesdf file
@@ -87,7 +91,7 @@ pub enum Command {
     Render(render::Args),
     /// Write a page that plays a run in a browser, with its contacts
     View(view::Args),
-    /// Write a run as an animated GLB file, for Blender, three.js and others
+    /// Write a run as an animated GLB file, or a .tesdf file as JSON of TES-Encoder
     Export(export::Args),
     /// Print a completion script for a shell
     Completions(completions::Args),
@@ -129,6 +133,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Part(args) => part::run(args),
         Command::Encode(args) => encode::run(args),
         Command::EncodeAll(args) => encode_all::run(args),
+        Command::Import(args) => import::run(args),
         Command::Query(args) => query::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),

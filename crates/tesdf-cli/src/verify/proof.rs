@@ -51,6 +51,12 @@ pub fn text(report: &ProveReport) -> String {
         count(report.pieces as usize, "piece"),
         report.most_pieces
     );
+    if let Some(most) = report.nearer_by {
+        let share = most * report.delta_of_diagonal / report.delta;
+        text += &format!(
+            "  nearer by       {most:.3e} = {share:.2e} of the diagonal at most: what missing faces were found to be\n"
+        );
+    }
     report.faults.iter().for_each(|fault| text += &fault_text(fault));
     let undecided = report.distances.undecided + report.signs.undecided;
     if undecided > 0 {
@@ -84,7 +90,7 @@ fn fault_text(fault: &Fault) -> String {
         text += &format!("; at {x:?},{y:?},{z:?}");
     }
     if let (Some(list), Some(face)) = (fault.list_distance, fault.face_distance) {
-        text += &format!("; the list is at {list:?}, the face at {face:?}");
+        text += &format!("; the list is at {list:?}, the face at {face:?}: nearer by {:.3e}", list - face);
     }
     text + "\n"
 }

@@ -30,3 +30,4 @@ mod robots;
 mod simulate;
 mod slice_picture;
 mod split;
+mod tes_json;

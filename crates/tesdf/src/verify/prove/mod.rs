@@ -204,6 +204,7 @@ pub fn prove(
         face_tree,
         pieces: found.pieces,
         most_pieces: found.most_pieces,
+        nearer_by: (found.nearer_by > 0.0).then_some(found.nearer_by),
         faults: found.faults,
     })
 }

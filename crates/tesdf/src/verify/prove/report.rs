@@ -31,6 +31,9 @@ pub struct ProveReport {
     pub pieces: u64,
     /// Largest number of pieces of one cell.
     pub most_pieces: u64,
+    /// The most by which a face that a list misses is nearer than the list, at the points where
+    /// lists were shown to be wrong. In the mesh's unit; `None`: no list was.
+    pub nearer_by: Option<f64>,
     /// Claims that are not proved: the first [`FAULTS`](Self::FAULTS), in the order of the cells.
     pub faults: Vec<Fault>,
 }
@@ -137,6 +140,11 @@ impl Fault {
 
     pub(super) fn undecided(claim: Claim, reason: impl Into<String>) -> Self {
         Self::new(claim, Verdict::Undecided, reason)
+    }
+
+    /// For a wrong list, by how much the face is nearer than the list, in the mesh's unit.
+    pub fn nearer_by(&self) -> Option<f64> {
+        Some(self.list_distance? - self.face_distance?)
     }
 
     /// Sets the cell.

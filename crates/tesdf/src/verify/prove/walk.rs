@@ -18,6 +18,8 @@ pub struct CellResults {
     pub signs: Tally,
     pub pieces: u64,
     pub most_pieces: u64,
+    /// The most by which a face was found nearer than a list, in the unit of the mesh; 0 for none.
+    pub nearer_by: f64,
     pub faults: Vec<Fault>,
 }
 
@@ -30,6 +32,7 @@ impl CellResults {
             signs: self.signs.join(other.signs),
             pieces: self.pieces + other.pieces,
             most_pieces: self.most_pieces.max(other.most_pieces),
+            nearer_by: self.nearer_by.max(other.nearer_by),
             faults: self.faults,
         }
     }
@@ -37,6 +40,7 @@ impl CellResults {
     /// Counts a claim on distances.
     fn distance(&mut self, fault: Option<Fault>) {
         self.distances.count(fault.as_ref());
+        self.nearer_by = fault.as_ref().and_then(Fault::nearer_by).unwrap_or(0.0).max(self.nearer_by);
         self.faults.extend(fault);
     }
 
