@@ -105,6 +105,23 @@ impl Asset {
     }
 }
 
+/// Reads a JSON file of TES-Encoder, the program of the paper's authors: a surface, tetrahedra that
+/// conform to it, and their lists.
+///
+/// The lists stay as they are, and nothing is proved of them: the asset's certificate has no delta.
+/// `tesdf verify --prove` proves them, or shows where a list misses a face. Surface and tetrahedra
+/// are checked, as encode does.
+///
+/// Raises OSError if the file cannot be read. Raises MeshError, which names the key and the place in
+/// its array, if a value does not fit or the tetrahedra do not conform to the surface, and
+/// NotSolidError if the surface has no well-defined inside.
+#[pyfunction]
+pub fn import_json(py: Python<'_>, path: PathBuf) -> PyResult<Asset> {
+    let pool = pool::shared().map_err(|e| e.raise(py))?;
+    let imported = py.detach(|| pool.install(|| TeSdf::import_json(&path)));
+    imported.map(Asset::new).map_err(|e| Error::ImportJson(path, e).raise(py))
+}
+
 fn named(precision: &str) -> PyResult<Precision> {
     match precision {
         "f64" => Ok(Precision::F64),
@@ -142,6 +159,17 @@ impl Asset {
     /// keeps its permissions. A read-only file raises PermissionError.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.save(&path)).map_err(|e| Error::Asset(Some(path), e).raise(py))
+    }
+
+    /// Writes a JSON file of TES-Encoder, the program of the paper's authors, which import_json reads.
+    ///
+    /// The asset must have a conforming domain: encode with domain="gmsh" or a file of tetrahedra,
+    /// and with plain=True if each tetrahedron should be one cell; otherwise a tetrahedron gets the
+    /// faces of all of its cells. Raises EncodeError for the bisection domain, and OSError if the
+    /// file cannot be written.
+    fn export_json(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let written = py.detach(|| self.inner.export_json(&path));
+        written.map_err(|e| Error::ExportJson(path, e).raise(py))
     }
 
     /// Signed distance, gradient, closest point and face for each of the points [N, 3].

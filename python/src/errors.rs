@@ -11,7 +11,7 @@ use tesdf::asset::AssetError;
 use tesdf::collide::CollideError;
 use tesdf::deform::DeformError;
 use tesdf::domain::ReadTetrahedraError;
-use tesdf::encode::{ChoiceError, DomainError, EncodeError};
+use tesdf::encode::{ChoiceError, DomainError, EncodeError, ExportJsonError, ImportJsonError};
 use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
 use tesdf::save::SaveError;
 use tesdf::verify::VerifyError;
@@ -38,6 +38,9 @@ pub enum Error {
     Deform(DeformError),
     /// The path, if the asset comes from a file.
     Asset(Option<PathBuf>, AssetError),
+    /// The JSON file.
+    ImportJson(PathBuf, ImportJsonError),
+    ExportJson(PathBuf, ExportJsonError),
     Verify(VerifyError),
     Collide(CollideError),
     /// The place in the arguments, such as `poses: row 3`.
@@ -77,6 +80,7 @@ impl Error {
             Self::Read(_, ReadError::Open { ref source, .. }) => system(source, self.text()),
             Self::Asset(_, AssetError::Io { ref source, .. }) => system(source, self.text()),
             Self::Asset(_, AssetError::Save(ref refused))
+            | Self::ExportJson(_, ExportJsonError::Save(ref refused))
             | Self::Record(_, RecordError::Save(ref refused)) => match refused {
                 SaveError::Io { source, .. } => system(source, self.text()),
                 SaveError::ReadOnly { .. } => PyPermissionError::new_err(self.text()),
@@ -99,6 +103,15 @@ impl Error {
             Self::Domain(DomainError::Read {
                 source: ReadTetrahedraError::Open { ref source, .. }, ..
             }) => system(source, self.text()),
+            Self::ImportJson(_, ImportJsonError::Read { ref source, .. }) => system(source, self.text()),
+            Self::ImportJson(path, ImportJsonError::NotSolid(found)) => {
+                Self::NotSolid(Some(path), found).raise(py)
+            }
+            Self::ImportJson(path, ImportJsonError::Encode(found)) => {
+                Self::Encode(Some(path), found).raise(py)
+            }
+            Self::ImportJson(..) => new(py, "MeshError", self.text()),
+            Self::ExportJson(..) => new(py, "EncodeError", self.text()),
             Self::Read(..) | Self::Mesh(_) | Self::Repair(..) | Self::Domain(DomainError::Read { .. }) => {
                 new(py, "MeshError", self.text())
             }
@@ -147,6 +160,10 @@ impl Error {
             Self::Deform(e) => e.to_string(),
             Self::Asset(_, e @ (AssetError::Io { .. } | AssetError::Save(_))) => e.to_string(),
             Self::Asset(path, e) => at(path, e),
+            Self::ImportJson(_, e @ ImportJsonError::Read { .. }) => e.to_string(),
+            Self::ImportJson(path, e) => format!("{}: {e}", path.display()),
+            Self::ExportJson(_, e @ ExportJsonError::Save(_)) => e.to_string(),
+            Self::ExportJson(path, e) => format!("{}: {e}", path.display()),
             Self::Verify(e) => e.to_string(),
             Self::Collide(e) => e.to_string(),
             Self::CollideAt(at, e) => format!("{at}: {e}"),

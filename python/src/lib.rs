@@ -39,7 +39,7 @@ mod worlds;
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]
-    use super::asset::Asset;
+    use super::asset::{Asset, import_json};
     #[pymodule_export]
     use super::device::{DeviceArray, devices};
     #[pymodule_export]

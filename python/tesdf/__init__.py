@@ -70,6 +70,7 @@ from ._native import (
     check,
     devices,
     encode,
+    import_json,
     repair,
     view,
 )
@@ -194,6 +195,7 @@ __all__ = [
     "devices",
     "encode",
     "export",
+    "import_json",
     "read_usd",
     "repair",
     "signed_distance",

@@ -226,6 +226,17 @@ def encode(
     Raises OSError or MeshError if the mesh or the tetrahedra cannot be read. Raises NotSolidError
     if the mesh has no well-defined inside. Raises EncodeError if an option does not apply to the
     mesh, options exclude each other, Gmsh fails, or the tetrahedra do not conform to the mesh."""
+def import_json(path: _Path) -> Asset:
+    """Reads a JSON file of TES-Encoder, the program of the paper's authors: a surface, tetrahedra that
+    conform to it, and their lists.
+
+    The lists stay as they are, and nothing is proved of them: the asset's certificate has no delta.
+    `tesdf verify --prove` proves them, or shows where a list misses a face. Surface and tetrahedra
+    are checked, as encode does.
+
+    Raises OSError if the file cannot be read. Raises MeshError, which names the key and the place in
+    its array, if a value does not fit or the tetrahedra do not conform to the surface, and
+    NotSolidError if the surface has no well-defined inside."""
 @final
 class Asset:
     @staticmethod
@@ -243,6 +254,13 @@ class Asset:
     def save(self, path: _Path) -> None:
         """Writes the file with the bytes of to_bytes. An existing file is replaced in one step and
         keeps its permissions. A read-only file raises PermissionError."""
+    def export_json(self, path: _Path) -> None:
+        """Writes a JSON file of TES-Encoder, the program of the paper's authors, which import_json reads.
+
+        The asset must have a conforming domain: encode with domain="gmsh" or a file of tetrahedra,
+        and with plain=True if each tetrahedron should be one cell; otherwise a tetrahedron gets the
+        faces of all of its cells. Raises EncodeError for the bisection domain, and OSError if the
+        file cannot be written."""
     @overload
     def query(self, points: DeviceArray, precision: _Precision = "f64", *, device: _Device = "cpu") -> DeviceAnswers:
         """Signed distance, gradient, closest point and face for each of the points [N, 3].

@@ -42,6 +42,25 @@ def test_plain_and_truncated(beam):
     assert 0 < short.certificate.exactness_distance < short.statistics.diagonal
 
 
+def test_json_of_the_authors(beam, tmp_path):
+    (vertices, faces), file = beam
+    asset = tesdf.encode((vertices, faces), "fast", domain=file, plain=True)
+    asset.export_json(tmp_path / "beam.json")
+    again = tesdf.import_json(str(tmp_path / "beam.json"))
+    assert again.certificate.delta is None and again.certificate.domain == "conforming"
+    assert again.source.name == "beam.json" and again.inspect().classes == asset.inspect().classes
+    assert again.statistics.entries == asset.statistics.entries
+    points = np.random.default_rng(1).uniform(-1, 7, (500, 3))
+    assert np.abs(again.signed_distance(points) - asset.signed_distance(points)).max() < 1e-12
+    with pytest.raises(tesdf.EncodeError, match='domain="gmsh", plain=True'):
+        tesdf.encode((vertices, faces), "fast").export_json(tmp_path / "a.json")
+    with pytest.raises(FileNotFoundError, match="none.json"):
+        tesdf.import_json(tmp_path / "none.json")
+    (tmp_path / "bad.json").write_text((tmp_path / "beam.json").read_text().replace('"num_of_faces":', '"num_of_faces":1'))
+    with pytest.raises(tesdf.MeshError, match="bad.json: num_of_faces: 1"):
+        tesdf.import_json(tmp_path / "bad.json")
+
+
 def test_gmsh(beam):
     mesh, _ = beam
     asset = tesdf.encode(mesh, "fast", domain="gmsh", band=0.5)
