@@ -44,7 +44,7 @@ fn over_plane(search: &Search, part: &Part, reach: f64, found: &mut impl FnMut(M
     // The extremes of a triangle are where the plane opposes it.
     let has_extremes = !is_triangle || part.normal.z < OPPOSES;
     let is_known = part.normal != DVec3::ZERO && part.facing == PartFacing::Everywhere;
-    if is_triangle && !is_known || !is_large && !(is_triangle && has_extremes) {
+    if !(if is_triangle { is_known && (is_large || has_extremes) } else { is_large }) {
         return false;
     }
     let lower = |p: DVec3, q: DVec3| if q.z < p.z { q } else { p };

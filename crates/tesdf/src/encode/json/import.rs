@@ -6,7 +6,7 @@ use super::file::Encoded;
 use super::read::read;
 use crate::asset::about::Source;
 use crate::asset::layout::{Label, TREE_LEAF};
-use crate::asset::{AssetError, TeSdf};
+use crate::asset::TeSdf;
 use crate::base::{Certificate, Chains, Progress, Proved, Side};
 use crate::domain::{ConformingMesh, TetMesh};
 use crate::encode::assemble::assemble;
@@ -97,7 +97,7 @@ fn assembled(
     let (diagonal, side) = (presented.mesh.diagonal(), placed.roots.cube.side());
     about.certificate = Certificate::new(ENCODER.into(), domain.name().into(), diagonal, side, proved);
     let parts = Parts { presented: &presented, placed: &placed, tree: &tree, hints: &hints, forest: &forest };
-    let bytes = parts.write(&request, &about).map_err(AssetError::from)?;
+    let bytes = parts.write(&request, &about)?;
     Ok(TeSdf::from_bytes(&bytes)?)
 }
 
