@@ -15,7 +15,7 @@ const FILE: &str = r#"{
 #[test]
 fn a_file_is_imported_verified_and_exported() {
     let folder = Folder::new();
-    folder.write("good.json", &FILE.replace("LIST", "2"));
+    folder.write("good.json", FILE.replace("LIST", "2"));
     let text = folder.good(&["import", "good.json", "-o", "good.tesdf"]);
     assert!(text.contains("not proven") && text.contains("2.5 faces, longest 4"), "{text}");
     let text = folder.good(&["inspect", "good.tesdf"]);
@@ -32,7 +32,7 @@ fn a_file_is_imported_verified_and_exported() {
 
     // The outer list has a face that is nowhere the nearest: at the slanted face, the distance is
     // up to 1 instead of 0.
-    folder.write("bad.json", &FILE.replace("LIST", "0"));
+    folder.write("bad.json", FILE.replace("LIST", "0"));
     folder.good(&["import", "bad.json", "-o", "bad.tesdf"]);
     let (code, text, _) = folder.tesdf(&["verify", "bad.tesdf", "--prove", "--samples", "500"]);
     assert_eq!(code, Some(1));
@@ -46,8 +46,8 @@ fn a_file_is_imported_verified_and_exported() {
 #[test]
 fn what_does_not_fit_is_refused() {
     let folder = Folder::new();
-    folder.write("good.json", &FILE.replace("LIST", "2"));
-    folder.write("bad.json", &FILE.replace("LIST", "4"));
+    folder.write("good.json", FILE.replace("LIST", "2"));
+    folder.write("bad.json", FILE.replace("LIST", "4"));
     folder.good(&["import", "good.json", "-o", "good.tesdf"]);
     folder.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
     folder.good(&["encode", "cube.obj", "-o", "cube.tesdf"]);
