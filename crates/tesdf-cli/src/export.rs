@@ -2,14 +2,15 @@
 //! -o FILE.json`: an asset as JSON of TES-Encoder.
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::slice;
 
+use crate::terminal::asset_file;
 use crate::terminal::interrupt;
 use crate::terminal::output::{self, Consent};
 use crate::terminal::parse;
 use crate::terminal::report::{self, Failure, Outcome};
 use tesdf_playback::{Frames, GlbOptions, Playback, glb};
 
-use crate::export_json;
 use crate::open_run::{self, OpenRun};
 
 /// Arguments of `tesdf export`.
@@ -60,10 +61,11 @@ impl FrameArgs {
 /// Writes the run as a GLB file, or the asset as JSON.
 ///
 /// # Errors
-/// The asset cannot be opened or has no conforming domain. The run or a geometry cannot be opened, a state is not valid, or the file cannot be written.
+/// The asset cannot be opened or has no conforming domain. The run or a geometry cannot be opened, a
+/// state is not valid, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.run.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("tesdf")) {
-        return export_json::run(args);
+        return asset_as_json(args);
     }
     let interrupted = interrupt::flag();
     let OpenRun { record, system, output, .. } =
@@ -76,6 +78,41 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         ("animation", args.output.display().to_string()),
         ("bodies", run.bodies.len().to_string()),
         ("frames", format!("{} of {} states", run.steps.len(), record.times().len())),
+        ("size", format!("{:.2} MB", bytes.len() as f64 / 1e6)),
+    ])?;
+    Ok(Outcome::Good)
+}
+
+/// Writes an asset as JSON.
+///
+/// # Errors
+/// The asset cannot be opened, it has no conforming domain, an option of runs is given, or the file
+/// cannot be written.
+fn asset_as_json(args: &Args) -> Result<Outcome, Failure> {
+    let file = args.run.display();
+    let is_of_runs = args.frames.every.is_some()
+        || args.frames.fps.is_some()
+        || args.speed != 1.0
+        || !args.geometries.is_empty();
+    if is_of_runs {
+        return Err(Failure::new(format!(
+            "{file}: --every, --fps, --speed and --geometry are for runs; leave them out for a .tesdf file"
+        )));
+    }
+    let output = output::open(&args.output, slice::from_ref(&args.run), args.consent)?;
+    if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
+        let found = args.output.display();
+        return Err(Failure::new(format!(
+            "{found}: a .tesdf file is exported as JSON; expected a name in .json"
+        ))
+        .hint(format!("-o {}", args.output.with_extension("json").display())));
+    }
+    let asset = asset_file::open(&args.run)?;
+    let bytes = asset.to_json_bytes().map_err(|e| Failure::new(format!("{file}: {e}")))?;
+    output::write(&output, &bytes)?;
+    report::table(&[
+        ("JSON", args.output.display().to_string()),
+        ("faces", asset.face_count().to_string()),
         ("size", format!("{:.2} MB", bytes.len() as f64 / 1e6)),
     ])?;
     Ok(Outcome::Good)

@@ -21,7 +21,6 @@ pub mod devices;
 pub mod encode;
 pub mod encode_all;
 pub mod export;
-mod export_json;
 pub mod import;
 pub mod inspect;
 mod open_run;

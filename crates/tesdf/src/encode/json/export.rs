@@ -86,12 +86,24 @@ impl File {
             let at_surface = corners.iter().any(|&v| (v as usize) < surface);
             let group = 2 * usize::from(side == Side::Outside) + usize::from(!at_surface);
             let [a, b, c, d] = corners.map(|v| (v as usize).checked_sub(surface).map_or(v, |own| id[own]));
-            file.tetrahedra[group].push([a, b, d, c]);
+            file.tetrahedra[group].push(ascending([a, b, d, c]));
             file.lengths[group].push(list.len() as u32);
             file.lists[group].extend(list);
         }
         Ok(file)
     }
+}
+
+/// The same tetrahedron with the same orientation, and its corners in ascending order but for the last
+/// two. So an asset that is exported again has the same bytes.
+fn ascending(mut corners: [u32; 4]) -> [u32; 4] {
+    let pairs = (0..4).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let is_odd = pairs.filter(|&(i, j)| corners[i] < corners[j]).count() % 2 == 1;
+    corners.sort_unstable();
+    if is_odd {
+        corners.swap(2, 3);
+    }
+    corners
 }
 
 /// Adds the lists of the cells below a word, by the places of faces in the asset. The side of the
