@@ -266,9 +266,9 @@ fn the_gradient_is_that_of_differences_where_the_clearance_is_smooth() {
         for i in 0..robot.dof() {
             match derivative(&robot, &q, i) {
                 Some(d) => {
-                    // On the round side of a cylinder, the nearest point is known up to the root of
-                    // the tolerance times its radius.
-                    assert!((gradient[i] - d).abs() < 2e-5 * d.abs().max(0.1), "{q:?} {i}: {gradient:?} {d}");
+                    // On the round side of a cylinder, the direction is known up to the root of
+                    // twice the tolerance over its radius: 2e-4 with 5 cm.
+                    assert!((gradient[i] - d).abs() < 2e-4 * d.abs().max(0.1), "{q:?} {i}: {gradient:?} {d}");
                     smooth += 1;
                 }
                 None => kinks += 1,
