@@ -58,7 +58,8 @@ def test_gradients_are_those_of_differences(arm):
         coarse = (8 * (at(2) - at(-2)) - at(4) + at(-4)) / 24e-3
         kink = np.abs(coarse - fine) > 1e-8
         smooth += (~kink).sum()
-        assert found.gradient[~kink] == pytest.approx(fine[~kink], rel=1e-6, abs=1e-7)
+        # At round links, the direction is known up to the root of twice the tolerance over their radius.
+        assert found.gradient[~kink] == pytest.approx(fine[~kink], rel=2e-4, abs=2e-5)
     assert smooth > 20
 
 
