@@ -74,6 +74,7 @@ __all__ = [
     "encode",
     "export",
     "fill_mujoco_contacts",
+    "import_json",
     "pair",
     "polygons",
     "pose",
