@@ -5,9 +5,9 @@ use crate::TeSdf;
 use crate::collide::bodies::field::{Field, FieldBody, ROUNDING};
 use crate::collide::bodies::jump;
 use crate::collide::bodies::polygon::{Parts, Polygon};
-use crate::collide::bodies::round_side::RoundSide;
 use crate::collide::bodies::surface::{Part, SurfaceBody};
 use crate::collide::scene::field_value::FieldValue;
+use crate::collide::search::bulge::Bulge;
 use crate::collide::search::depth_bounds::{Bound, DepthBounds, Kind};
 use crate::collide::search::longest_edge::longest_edge;
 use crate::geometry::{Feature, GeneralizedWinding, Triangle, polygon_to_triangle};
@@ -28,16 +28,6 @@ pub struct Piece {
     bounds: DepthBounds,
     /// The round side that the piece stands for, if any.
     bulge: Option<Bulge>,
-}
-
-/// A piece of which corners are on a round side. What is between them there lies beside the piece.
-#[derive(Clone, Debug)]
-struct Bulge {
-    round: RoundSide,
-    /// Which corners are on it.
-    is_on: [bool; 3],
-    /// The surface lies within this distance of the piece.
-    height: f64,
 }
 
 /// What a piece has become by a look at it.
@@ -117,29 +107,11 @@ const COARSE: f64 = 1e-4;
 /// their computed distance is rarely 0 but about 1e-17.
 const CLEAR: f64 = 1e-9;
 
-impl Bulge {
-    fn new(round: RoundSide, is_on: [bool; 3], corners: [DVec3; 3]) -> Option<Self> {
-        let chord = EDGES.iter().filter(|&&(k, l)| is_on[k] && is_on[l]);
-        let chord = chord.map(|&(k, l)| round.chord(corners[k], corners[l])).fold(0.0, f64::max);
-        // Between places that differ by an angle α, at most 1 - cos(α / 2), or α² / 8, of the radius.
-        // Pieces span less than 0.2, where α is at most 1.002 times its chord.
-        let height = 1.01 * chord * chord / (8.0 * round.radius);
-        (height > 0.0).then_some(Self { round, is_on, height })
-    }
-}
-
-/// The corners of the edges of a triangle.
-const EDGES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
-
 impl Piece {
     /// A whole face of a surface.
     pub fn new(surface: &SurfaceBody, face: u32, part: &Part) -> Self {
         let piece = Self::of_points(face, part.points(), part.normal, part.radius);
-        let bulge = surface.round_side().and_then(|round| {
-            // Only the middles of the ends are on the axis.
-            let is_on = piece.corners.map(|p| round.beside(p).length() > 0.5 * round.radius);
-            Bulge::new(round, is_on, piece.corners)
-        });
+        let bulge = surface.round_side().and_then(|round| Bulge::of_face(round, piece.corners));
         Self { bulge, ..piece }
     }
 
@@ -157,42 +129,24 @@ impl Piece {
 
     /// The point of the surface that a point of the piece stands for.
     fn on_surface(&self, p: DVec3) -> DVec3 {
-        match &self.bulge {
-            // What is on an end is on the surface.
-            Some(Bulge { round, is_on: [true, true, true], .. }) => round.nearest(p),
-            _ => p,
-        }
+        self.bulge.as_ref().map_or(p, |bulge| bulge.on_surface(p))
     }
 
-    /// The halves of a piece that stands for a part of a round side. The middle of a side between
-    /// two corners on it is on it, too. `is_flat` tells whether only the bulge is too high.
+    /// The halves of a piece that stands for a part of a round side.
     fn halves_of_bulge(&self, field: &FieldBody, bulge: &Bulge, is_flat: bool) -> Vec<Self> {
-        let Bulge { round, is_on, .. } = bulge;
-        let length = |&(k, l): &(usize, usize)| match is_flat {
-            true if is_on[k] && is_on[l] => round.chord(self.corners[k], self.corners[l]),
-            true => 0.0,
-            false => self.corners[k].distance(self.corners[l]),
-        };
-        let longest = EDGES.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
-        let &(k, l) = longest.unwrap_or(&EDGES[0]);
-        let is_on_round = is_on[k] && is_on[l];
-        let middle = 0.5 * (self.corners[k] + self.corners[l]);
-        let middle = if is_on_round { round.nearest(middle) } else { middle };
-        [l, k]
-            .map(|moved| {
-                let mut half = Self { bounds: DepthBounds::NONE, ..self.clone() };
-                half.corners[moved] = middle;
-                let mut is_on = *is_on;
-                is_on[moved] = is_on_round;
-                half.bulge = Bulge::new(*round, is_on, half.corners);
-                for bound in self.bounds.iter() {
-                    if let Some(triangle) = triangle(field, bound.face) {
-                        half.bounds.add(chord(bound.face, &triangle, half.corners));
-                    }
-                }
-                half
-            })
-            .into()
+        let faces: Vec<(u32, Triangle)> =
+            self.bounds.iter().filter_map(|b| Some((b.face, triangle(field, b.face)?))).collect();
+        let half = |(corners, bulge)| Self { bulge, ..self.with_corners(corners, &faces) };
+        bulge.halves(self.corners, is_flat).map(half).into()
+    }
+
+    /// A piece with other corners, and with the bounds by the distances of these from faces.
+    fn with_corners(&self, corners: [DVec3; 3], faces: &[(u32, Triangle)]) -> Self {
+        let mut part = Self { corners, bounds: DepthBounds::NONE, ..self.clone() };
+        for (face, triangle) in faces {
+            part.bounds.add(chord(*face, triangle, corners));
+        }
+        part
     }
 
     /// No point of the surface is deeper, by the bounds.
@@ -278,11 +232,7 @@ impl Piece {
             let points: Vec<DVec3> = polygon.points().collect();
             for k in 2..points.len() {
                 let corners = [points[0], points[k - 1], points[k]];
-                let mut part = Self { corners, bounds: DepthBounds::NONE, ..self.clone() };
-                for (face, triangle) in &faces {
-                    part.bounds.add(chord(*face, triangle, corners));
-                }
-                parts.push(part);
+                parts.push(self.with_corners(corners, &faces));
             }
         }
         Some(parts)
