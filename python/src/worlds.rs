@@ -132,6 +132,22 @@ impl Worlds {
         self.change(py, chosen, values, |world, value| set(world.engine_mut(), value))
     }
 
+    /// Sets a coefficient of a body, a number or [k].
+    fn set_coefficient(
+        &self,
+        py: Python<'_>,
+        body: &Bound<'_, PyAny>,
+        coefficient: &Bound<'_, PyAny>,
+        worlds: Option<&Bound<'_, PyAny>>,
+        set: fn(&mut Newton, usize, f64) -> Result<(), sim::DynamicsError>,
+    ) -> PyResult<()> {
+        let (body, chosen) = (self.body(py, body)?, self.chosen(py, worlds)?);
+        let values = columns::<1>("coefficient", coefficient, chosen.len())?;
+        self.set(py, chosen, values, |engine, [coefficient]| {
+            set(engine, body, coefficient).map_err(Error::Dynamics)
+        })
+    }
+
     fn body(&self, py: Python<'_>, any: &Bound<'_, PyAny>) -> PyResult<usize> {
         index_of("body", any, &self.bodies(py))
     }
@@ -310,11 +326,7 @@ impl Worlds {
         coefficient: &Bound<'_, PyAny>,
         worlds: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (body, chosen) = (self.body(py, body)?, self.chosen(py, worlds)?);
-        let values = columns::<1>("coefficient", coefficient, chosen.len())?;
-        self.set(py, chosen, values, |engine, [coefficient]| {
-            engine.set_friction(body, coefficient).map_err(Error::Dynamics)
-        })
+        self.set_coefficient(py, body, coefficient, worlds, Newton::set_friction)
     }
 
     /// Sets the coefficients of torsional friction of a body, m: a number or [k], as in
@@ -327,11 +339,7 @@ impl Worlds {
         coefficient: &Bound<'_, PyAny>,
         worlds: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (body, chosen) = (self.body(py, body)?, self.chosen(py, worlds)?);
-        let values = columns::<1>("coefficient", coefficient, chosen.len())?;
-        self.set(py, chosen, values, |engine, [coefficient]| {
-            engine.set_friction_torsional(body, coefficient).map_err(Error::Dynamics)
-        })
+        self.set_coefficient(py, body, coefficient, worlds, Newton::set_friction_torsional)
     }
 
     /// Sets gravity: [3] or [k, 3], m/s², as in Simulation.set_gravity.
