@@ -353,8 +353,8 @@ impl Robot {
     ///
     /// - margin: the clearance to keep, m.
     /// - tolerance: the motion is undecided only where its clearance is above the margin by less than
-    ///   twice this, m, or after
-    /// - steps: intervals of pairs of bodies that are looked at.
+    ///   twice this, m, or after `steps`.
+    /// - steps: most intervals of pairs of bodies that are looked at.
     #[pyo3(signature = (q0, q1, *, margin = 0.0, tolerance = 1e-4, steps = 100_000))]
     fn check_motion<'py>(
         &self,

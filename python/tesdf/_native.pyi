@@ -420,8 +420,8 @@ class Robot:
 
         - margin: the clearance to keep, m.
         - tolerance: the motion is undecided only where its clearance is above the margin by less than
-          twice this, m, or after
-        - steps: intervals of pairs of bodies that are looked at."""
+          twice this, m, or after `steps`.
+        - steps: most intervals of pairs of bodies that are looked at."""
     def check_motions(
         self,
         q0: npt.ArrayLike,

@@ -18,7 +18,8 @@ use crate::open_run::{self, OpenRun};
 pub struct Args {
     /// The run, which `tesdf simulate` wrote; or a .tesdf file with a conforming domain
     pub run: PathBuf,
-    /// Output GLB file, or JSON file of TES-Encoder for a .tesdf file; an existing file is replaced, a pipe or device is written to
+    /// Output GLB file, or JSON file of TES-Encoder for a .tesdf file; an existing file is replaced,
+    /// a pipe or device is written to
     #[arg(short, long, value_name = "GLB")]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
