@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import Scene, asset_of
-from .shapes import Box, Capsule, Cylinder, Plane, Sphere
+from .shapes import SIMPLE, Box, Capsule, Cylinder, Plane, Sphere
 
 if TYPE_CHECKING:
     from .bodies import Body
@@ -87,7 +87,7 @@ class CollisionManager:
 
     def add_object(self, name: str, mesh: Body, transform: npt.ArrayLike | None = None) -> None:
         """Adds a body, or replaces the one of this name."""
-        shape = mesh if isinstance(mesh, (Plane, Box, Sphere, Capsule, Cylinder)) else asset_of(mesh)
+        shape = mesh if isinstance(mesh, SIMPLE) else asset_of(mesh)
         added = self._scene.add(self._scene.add_shape(shape), transform)
         if name in self._bodies:
             self.remove_object(name)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from . import _native
-from .shapes import Box, Capsule, Cylinder, Plane, Sphere
+from .shapes import SIMPLE, Box, Capsule, Cylinder, Plane, Sphere
 
 _GEOMETRY = ("asset", "mesh", "shape")
 
@@ -52,7 +52,7 @@ def _body(k: int, body: Any, memory: _Memory) -> Any:
         if value is None or isinstance(value, (str, os.PathLike, Mapping)):
             continue
         del body[key]
-        if isinstance(value, (Plane, Box, Sphere, Capsule, Cylinder)):
+        if isinstance(value, SIMPLE):
             body["shape"] = _shape(value)
         elif isinstance(value, _native.Asset):
             body["asset"] = memory.name(id(value), value, lambda: value)

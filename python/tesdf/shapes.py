@@ -42,3 +42,7 @@ class Cylinder:
     half_height: float
     """half of the length"""
     radius: float
+
+
+SIMPLE = (Plane, Box, Sphere, Capsule, Cylinder)
+"""the simple shapes, for isinstance"""

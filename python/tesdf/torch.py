@@ -36,7 +36,7 @@ from torch import Tensor
 
 from . import _derivatives, _native
 from .contacts import Clearances, Contacts
-from .shapes import Box, Capsule, Cylinder, Plane, Sphere
+from .shapes import SIMPLE
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -327,7 +327,7 @@ class _Pair:
         for body_given, (rotation, translation), scale in zip((a, b), self.parts, self.scales):
             matrices = torch.eye(4, dtype=torch.float64).repeat(len(translation), 1, 1)
             matrices[:, :3, :3], matrices[:, :3, 3] = rotation.detach(), translation.detach()
-            is_simple = isinstance(body_given, (Plane, Box, Sphere, Capsule, Cylinder))
+            is_simple = isinstance(body_given, SIMPLE)
             shape: Any = body_given if is_simple else _native.asset_of(body_given)  # type: ignore[arg-type]
             self.bodies.append(shape)
             ids.append(self.scene.add_many(self.scene.add_shape(shape), matrices.numpy(), scale=scale.detach().numpy()))
