@@ -34,7 +34,8 @@ use crate::pool;
 /// - resolution: an edge of a tetrahedron has resolution + 1 samples. None is 32, or the value of
 ///   the preset.
 /// - threshold: a face is listed if it is at most this length farther than the closest face at a
-///   sample, in the mesh's unit. "safe" is large enough that no needed face is missing.
+///   sample, in the mesh's unit. "squared:1e-6" compares squared distances instead, in the squared
+///   unit. "safe" is large enough that no needed face is missing.
 /// - e_max: maximum length of a list; the faces that are needed nearest to the surface stay.
 /// - deformable: prepares the lists for moving vertices; needs a conforming domain ("gmsh" or a
 ///   path).
@@ -231,10 +232,9 @@ fn domain_choice(any: &Bound<'_, PyAny>) -> PyResult<DomainChoice> {
 
 fn length_or_safe(any: &Bound<'_, PyAny>) -> PyResult<Threshold> {
     if let Ok(text) = any.cast::<PyString>() {
-        return match &*text.to_cow()? {
-            "safe" => Ok(Threshold::CoveringRadius),
-            text => Err(argument("threshold", format!("'{text}'"), "a length or 'safe'")),
-        };
+        let text = text.to_cow()?;
+        let expected = "a length of 0 or more, 'safe', or 'squared:' and an area, as 'squared:1e-6'";
+        return text.parse().map_err(|_| argument("threshold", format!("'{text}'"), expected));
     }
     any.extract().map(Threshold::Absolute)
 }

@@ -167,7 +167,7 @@ def encode(
     domain: Literal["bisection", "gmsh"] | _Path | None = None,
     encoder: Literal["certified", "sampled"] | None = None,
     resolution: int | None = None,
-    threshold: float | Literal["safe"] | None = None,
+    threshold: float | str | None = None,
     e_max: int | None = None,
     deformable: bool = False,
     plain: bool = False,
@@ -198,7 +198,8 @@ def encode(
     - resolution: an edge of a tetrahedron has resolution + 1 samples. None is 32, or the value of
       the preset.
     - threshold: a face is listed if it is at most this length farther than the closest face at a
-      sample, in the mesh's unit. "safe" is large enough that no needed face is missing.
+      sample, in the mesh's unit. "squared:1e-6" compares squared distances instead, in the squared
+      unit. "safe" is large enough that no needed face is missing.
     - e_max: maximum length of a list; the faces that are needed nearest to the surface stay.
     - deformable: prepares the lists for moving vertices; needs a conforming domain ("gmsh" or a
       path).

@@ -6,7 +6,7 @@ use crate::helix::Helix;
 use crate::outline::{angles, hexagon, polar};
 use crate::resolution::Resolution;
 use crate::surface::{Facing, Loop, Surface};
-use crate::thread::{Size, Thread};
+use crate::thread::{Size, Thread, ThreadRows};
 
 /// A hexagon head bolt. Its axis is z, its tip at z = 0, and its head on top.
 ///
@@ -26,6 +26,8 @@ use crate::thread::{Size, Thread};
 pub struct Bolt {
     /// The thread.
     pub thread: Thread,
+    /// Rows of faces of the thread.
+    pub rows: ThreadRows,
     /// From the tip to the head, in metres.
     pub length: f64,
     /// From the tip to the end of the full thread, in metres.
@@ -50,6 +52,7 @@ impl Bolt {
         let length = row.shortest * 1e-3;
         Self {
             thread: size.thread(),
+            rows: ThreadRows::default(),
             length,
             thread_length: Self::iso_thread_length(&size.thread(), length),
             across_flats: row.across_flats * 1e-3,
@@ -93,7 +96,7 @@ impl Bolt {
             columns: segments,
             heights: [0.0, thread_length],
             pitch: thread.pitch,
-            rows: &thread.rows(segments),
+            rows: &thread.rows(self.rows, segments),
             radius: |phase: f64, z: f64| (thread.radius(phase) - clearance).min(tip + z),
         }
         .build(&mut surface)?;

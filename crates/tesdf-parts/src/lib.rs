@@ -87,4 +87,4 @@ pub use sleeve::Sleeve;
 pub use spline::{Bore, Spline};
 pub use spool::{Groove, Spool};
 pub use spoon::Spoon;
-pub use thread::{Size, Thread};
+pub use thread::{Size, Thread, ThreadRows};

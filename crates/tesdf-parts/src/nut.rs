@@ -7,7 +7,7 @@ use crate::error::{PartError, above};
 use crate::helix::Helix;
 use crate::resolution::Resolution;
 use crate::surface::{Facing, Surface};
-use crate::thread::{Size, Thread};
+use crate::thread::{Size, Thread, ThreadRows};
 
 /// A hexagon nut. Its axis is z and its lower face at z = 0.
 ///
@@ -27,6 +27,8 @@ use crate::thread::{Size, Thread};
 pub struct Nut {
     /// The thread.
     pub thread: Thread,
+    /// Rows of faces of the thread.
+    pub rows: ThreadRows,
     /// Height, in metres.
     pub height: f64,
     /// Width across flats, in metres.
@@ -42,6 +44,7 @@ impl Nut {
     pub fn iso_4032(size: Size) -> Self {
         Self {
             thread: size.thread(),
+            rows: ThreadRows::default(),
             height: size.0.nut_height * 1e-3,
             across_flats: size.0.across_flats * 1e-3,
             clearance: size.thread().pitch / 40.0,
@@ -54,7 +57,7 @@ impl Nut {
     /// [`PartError`] names the parameter at fault.
     pub fn mesh(&self, resolution: Resolution) -> Result<SolidMesh, PartError> {
         self.check(resolution)?;
-        let Self { thread, height, across_flats, clearance } = *self;
+        let Self { thread, height, across_flats, clearance, .. } = *self;
         let segments = thread.segments(resolution);
         let mut surface = Surface::new("nut");
         let outwards = 1.0 / (PI / segments as f64).cos();
@@ -63,7 +66,7 @@ impl Nut {
             columns: segments,
             heights: [0.0, height],
             pitch: thread.pitch,
-            rows: &thread.rows(segments),
+            rows: &thread.rows(self.rows, segments),
             // Both ends are countersunk at 45°.
             radius: |phase: f64, z: f64| {
                 outwards * (thread.radius(phase) + clearance).max(mouth - z.min(height - z))

@@ -43,9 +43,8 @@ impl Thread {
         self.diameter / 2.0 - self.depth() * share
     }
 
-    /// Phases of the rows of vertices of one pitch. Crest, flanks and root are divided into faces
-    /// that are about as long as the chords of the turns.
-    pub(crate) fn rows(&self, segments: usize) -> Vec<f64> {
+    /// Phases of the rows of vertices of one pitch.
+    pub(crate) fn rows(&self, divided: ThreadRows, segments: usize) -> Vec<f64> {
         let chord = std::f64::consts::PI * self.diameter / segments as f64;
         let flank = self.depth() / 30f64.to_radians().cos();
         let pieces = [
@@ -56,7 +55,10 @@ impl Thread {
         ];
         let mut rows = Vec::new();
         for (from, to, length) in pieces {
-            let count = (length / chord).round().max(1.0) as usize;
+            let count = match divided {
+                ThreadRows::AsChords => (length / chord).round().max(1.0) as usize,
+                ThreadRows::Corners => 1,
+            };
             rows.extend((0..count).map(|i| from + (to - from) * i as f64 / count as f64));
         }
         rows
@@ -74,6 +76,16 @@ impl Thread {
         not_negative("clearance", clearance)?;
         below("clearance", clearance, self.depth(), ", the depth of the thread")
     }
+}
+
+/// How crest, flanks and root of a thread are divided into rows of faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ThreadRows {
+    /// Rows about as high as the chords of a turn are long.
+    #[default]
+    AsChords,
+    /// A row for the crest, one for each flank, and one for the root: four in a pitch, the fewest.
+    Corners,
 }
 
 /// Dimensions of a size of bolt and nut, in millimetres.

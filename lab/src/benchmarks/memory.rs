@@ -56,7 +56,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     output::line(&format!(
         "- *Lists and tree*: sections `domain.*` and `lists.*`, and the table of entries that opening derives from \
          them.\n\
-         - *Paper account*: 4 bytes for each list entry and 16 for each cell with a list.\n\
+         - *Paper account*: 4 bytes for each list entry, 16 for each cell with a list, and 12 for each vertex of a \
+         conforming domain that is none of the mesh.\n\
          - *Fallback*: the face tree, which answers points in cells without a list.\n\
          - *Read*: list entries, or faces and nodes of the tree where the fallback answers, per query; mean over {n} \
          points each, *near* the surface (±{near} % of the diagonal) and uniform *in the domain*.\n\

@@ -1,4 +1,5 @@
-//! The meshes of Table I. The paper's own meshes are not public; these are the most similar ones.
+//! The meshes of Table I. Of the paper's own meshes its authors have published a bolt and a nut, without
+//! a licence: `paper-bolt` and `paper-nut` have their dimensions. The others are the most similar ones.
 use tesdf::Length;
 
 use super::paper;
@@ -62,9 +63,11 @@ impl Mesh {
 }
 
 /// All meshes, in the order of the table.
-pub const MESHES: [Mesh; 8] = [
-    rigid("bolt", "procedural/iso_m16_bolt_24k.obj", &["M16 bolt"], 0.0, AROUND, Quick::No),
-    rigid("nut", "procedural/iso_m16_nut_c100.obj", &["M16 Nut"], 0.0, None, Quick::No),
+pub const MESHES: [Mesh; 10] = [
+    rigid("paper-bolt", "parts/paper_bolt.ply", &["M16 bolt"], 0.0, AROUND, Quick::No),
+    rigid("paper-nut", "parts/paper_nut.ply", &["M16 Nut"], 0.0, None, Quick::No),
+    rigid("bolt", "procedural/iso_m16_bolt_24k.obj", &[], 0.0, AROUND, Quick::No),
+    rigid("nut", "procedural/iso_m16_nut_c100.obj", &[], 0.0, None, Quick::No),
     rigid("hole", "procedural/lobed_hole_c100.obj", &["Hole"], 0.0, AROUND, Quick::No),
     rigid("shaft", SHAFT, &["Shaft"], 1e-7, None, Quick::Yes),
     rigid("spoon", "procedural/spoon.obj", &["Spoon"], 1e-9, AROUND, Quick::No),

@@ -34,8 +34,9 @@ pub struct ChoiceArgs {
     #[arg(long, value_name = "Q")]
     pub resolution: Option<u32>,
     /// Threshold of the sampled encoder: a face is listed if it is at most this length farther than
-    /// the closest face at a sample; `safe` is large enough that no needed face is missing
-    #[arg(long, value_name = "LENGTH|safe", value_parser = threshold)]
+    /// the closest face at a sample; `squared:AREA` compares squared distances instead; `safe` is large
+    /// enough that no needed face is missing
+    #[arg(long, value_name = "LENGTH|safe|squared:AREA")]
     pub threshold: Option<Threshold>,
     /// Truncate each list to this number of faces; the faces that are needed nearest to the surface
     /// stay
@@ -106,17 +107,6 @@ impl ChoiceArgs {
             thickness: self.thickness,
             surface: self.surface,
         }
-    }
-}
-
-/// Parses a length, or `safe`.
-///
-/// # Errors
-/// The message says what was found.
-pub fn threshold(text: &str) -> Result<Threshold, String> {
-    match text {
-        "safe" => Ok(Threshold::CoveringRadius),
-        _ => parse::length(text).map(Threshold::Absolute),
     }
 }
 

@@ -1,8 +1,27 @@
 //! Bolts and nuts.
-use tesdf_parts::{PartError, Resolution, Size, Thread};
+use clap::ValueEnum;
+use tesdf_parts::{PartError, Resolution, Size, Thread, ThreadRows};
 
 use super::{Common, Made, Make, mm};
 use crate::terminal::parse;
+
+/// Values of `--thread-rows`.
+#[derive(ValueEnum, Clone, Copy, Debug)]
+pub enum Rows {
+    /// About as high as the chords of a turn are long
+    AsChords,
+    /// One for each of crest, flanks and root
+    Corners,
+}
+
+impl From<Rows> for ThreadRows {
+    fn from(rows: Rows) -> Self {
+        match rows {
+            Rows::AsChords => Self::AsChords,
+            Rows::Corners => Self::Corners,
+        }
+    }
+}
 
 /// Arguments of `tesdf part bolt`.
 #[derive(clap::Args, Debug)]
@@ -23,6 +42,12 @@ pub struct Bolt {
     /// the flanks is half of it
     #[arg(long, value_name = "LENGTH", value_parser = parse::metres, default_value = "0mm")]
     pub clearance: f64,
+    /// Width across flats [default: that of ISO 4014 and 4032]
+    #[arg(long, value_name = "LENGTH", value_parser = parse::metres)]
+    pub across_flats: Option<f64>,
+    /// Rows of faces of the thread
+    #[arg(long, value_enum, value_name = "ROWS", default_value = "as-chords")]
+    pub thread_rows: Rows,
     /// Output and resolution.
     #[command(flatten)]
     pub common: Common,
@@ -36,6 +61,8 @@ impl Make for Bolt {
         let longest = tesdf_parts::Bolt::iso_thread_length(&bolt.thread, bolt.length);
         bolt.thread_length = self.thread_length.unwrap_or(longest);
         bolt.clearance = self.clearance;
+        bolt.across_flats = self.across_flats.unwrap_or(bolt.across_flats);
+        bolt.rows = self.thread_rows.into();
         let mut facts = thread(&bolt.thread, bolt.clearance);
         facts.push(("thread length", format!("{} mm", mm(bolt.thread_length))));
         Ok(Made { solid: bolt.mesh(resolution)?, facts })
@@ -58,6 +85,12 @@ pub struct Nut {
     /// the flanks is half of it [default: 1/40 of the pitch]
     #[arg(long, value_name = "LENGTH", value_parser = parse::metres)]
     pub clearance: Option<f64>,
+    /// Width across flats [default: that of ISO 4014 and 4032]
+    #[arg(long, value_name = "LENGTH", value_parser = parse::metres)]
+    pub across_flats: Option<f64>,
+    /// Rows of faces of the thread
+    #[arg(long, value_enum, value_name = "ROWS", default_value = "as-chords")]
+    pub thread_rows: Rows,
     /// Output and resolution.
     #[command(flatten)]
     pub common: Common,
@@ -68,6 +101,8 @@ impl Make for Nut {
         let mut nut = tesdf_parts::Nut::iso_4032(self.size);
         nut.thread.pitch = self.pitch.unwrap_or(nut.thread.pitch);
         nut.height = self.height.unwrap_or(nut.height);
+        nut.across_flats = self.across_flats.unwrap_or(nut.across_flats);
+        nut.rows = self.thread_rows.into();
         nut.clearance = self.clearance.unwrap_or(nut.thread.pitch / 40.0);
         let facts = thread(&nut.thread, nut.clearance);
         Ok(Made { solid: nut.mesh(resolution)?, facts })

@@ -147,6 +147,9 @@ fn options_of_the_encoders() {
     let sampling = Sampling { resolution: 8, threshold: Threshold::CoveringRadius, ..Sampling::PAPER };
     assert_eq!(sampled.method, Method::Sampled(sampling));
     assert_eq!((sampled.deformation, sampled.refinement), (Deformation::Expected, Refinement::ByCost));
+    let squared = options(&["--encoder", "sampled", "--threshold", "squared:1e-6"]).1.unwrap();
+    let sampling = Sampling { resolution: 32, threshold: Threshold::Squared(1e-6), ..Sampling::PAPER };
+    assert_eq!(squared.method, Method::Sampled(sampling));
     for (wrong, named) in [
         (&["--plain"][..], ChoiceError::PlainBisection),
         (&["--resolution", "8"], ChoiceError::NotSampled),

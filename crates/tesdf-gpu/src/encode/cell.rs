@@ -35,10 +35,10 @@ impl Grid {
 pub struct CellRows([[f32; 4]; CELL_ROWS]);
 
 impl CellRows {
-    pub fn new(SampledCell { cell, threshold, .. }: &SampledCell, grid: &Grid) -> Self {
+    pub fn new(SampledCell { cell, threshold, squared, .. }: &SampledCell, grid: &Grid) -> Self {
         let center = cell.centroid();
         let corners = cell.corners.map(|c| grid.shrink * (c - center));
-        let numbers = [*threshold, cell.radius(), 2.0 * block_radius(&corners, grid.resolution), 0.0];
+        let numbers = [*threshold, cell.radius(), 2.0 * block_radius(&corners, grid.resolution), *squared];
         let row = |k: usize| {
             let [x, y, z] = corners[k].as_vec3().to_array();
             [x, y, z, at_least(numbers[k])]
@@ -59,9 +59,9 @@ impl CellRows {
     }
 
     /// Limit on the distance from the center of a block to a face that a sample of the block may
-    /// need. `nearest` is the distance from the center to the nearest face.
+    /// need. `nearest` is the squared distance from the center to the nearest face.
     pub fn block_limit(&self, nearest: f32) -> f32 {
-        block_limit(nearest, self.0[0][3], self.0[1][3], self.0[2][3])
+        block_limit(nearest + self.0[3][3], self.0[0][3], self.0[1][3], self.0[2][3])
     }
 
     pub fn radius(&self) -> f64 {

@@ -138,7 +138,7 @@ impl SampleCounter {
         for &block in grid.blocks.iter().skip(step / 2).step_by(step) {
             let middle = rows.middle(block, grid.resolution);
             let squared: Vec<f32> = faces.iter().map(|&f| f.squared_distance(middle)).collect();
-            let nearest = squared.iter().copied().fold(f32::INFINITY, f32::min).sqrt();
+            let nearest = squared.iter().copied().fold(f32::INFINITY, f32::min);
             let limit = rows.block_limit(nearest);
             groups += 1;
             survivors += squared.iter().filter(|s| **s <= limit * limit).count() as u64;

@@ -69,11 +69,16 @@ fn lists_have_the_faces_of_the_processor_and_ties_within_rounding() {
     let sampler = DeviceSampler::new(device());
     println!("device: {}", sampler.name());
     let progress = Progress::default();
-    let thresholds = [Threshold::Absolute(0.0), Threshold::Absolute(1e-3), Threshold::CoveringRadius];
+    let thresholds = [
+        Threshold::Absolute(0.0),
+        Threshold::Absolute(1e-3),
+        Threshold::Squared(1e-6),
+        Threshold::CoveringRadius,
+    ];
     let (mut listed, mut besides, mut most_candidates) = (0, 0, 0);
     for name in ["tetra", "cube", "l_bracket", "torus_quads", "shaft_keyway", "icosphere_5k"] {
         let case = Case::new(name);
-        for (threshold, resolution) in thresholds.into_iter().zip([9, 4, 3]) {
+        for (threshold, resolution) in thresholds.into_iter().zip([9, 4, 4, 3]) {
             let sampling = Sampling { resolution, threshold, ..Sampling::PAPER };
             let cells = case.sampled(&sampling);
             let found = sampler.sample(&case.surface, &cells, &sampling, &progress).expect("samples");

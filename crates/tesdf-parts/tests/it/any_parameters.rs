@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use tesdf::SolidMesh;
 use tesdf_parts::{
     Bolt, Bore, ChainLink, Dogs, Finger, Gear, Groove, Hub, Keyway, LobedHole, LobedPeg, Lobes, Nut,
-    PartError, Resolution, Section, Shaft, Size, Sleeve, Spline, Spool, Spoon, Teeth, Thread,
+    PartError, Resolution, Section, Shaft, Size, Sleeve, Spline, Spool, Spoon, Teeth, Thread, ThreadRows,
 };
 
 /// Numbers of dimensions, a millimetre to some centimetres.
@@ -30,12 +30,15 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn threads(l in lengths(), resolution in resolutions(), pitch in 0.05..0.45f64) {
+    fn threads(l in lengths(), resolution in resolutions(), pitch in 0.05..0.45f64, corners: bool) {
         let size = "M16".parse::<Size>().unwrap();
         let thread = Thread { diameter: l[0], pitch: pitch * l[0] };
-        good_or_refused(Nut { thread, height: l[1], across_flats: 2.0 * l[0], clearance: l[2] / 50.0 }.mesh(resolution));
+        let rows = if corners { ThreadRows::Corners } else { ThreadRows::AsChords };
+        let nut = Nut { thread, rows, height: l[1], across_flats: 2.0 * l[0], clearance: l[2] / 50.0 };
+        good_or_refused(nut.mesh(resolution));
         let bolt = Bolt {
             thread,
+            rows,
             length: 2.0 * l[1],
             thread_length: l[3],
             across_flats: 2.0 * l[0],

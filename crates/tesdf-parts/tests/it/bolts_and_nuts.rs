@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::solid::{Pair, data, good, holes, inside, message, near, radii, turned, volume};
 use tesdf::glam::{DVec3, dvec3};
-use tesdf_parts::{Bolt, Nut, Resolution, Size, Thread};
+use tesdf_parts::{Bolt, Nut, Resolution, Size, Thread, ThreadRows};
 
 fn m(text: &str) -> Size {
     text.parse().unwrap()
@@ -206,4 +206,20 @@ fn impossible_bolts_and_nuts_are_errors_that_name_the_limit() {
     // A short bolt is threaded up to its run-out.
     assert_eq!(Bolt::iso_thread_length(&bolt.thread, 0.03), Bolt::longest_thread(&bolt.thread, 0.03));
     good(Bolt { length: 0.03, thread_length: Bolt::iso_thread_length(&bolt.thread, 0.03), ..bolt }.mesh(n));
+}
+
+#[test]
+fn threads_with_rows_at_their_corners_alone_have_four_in_a_pitch() {
+    let segments = 96;
+    let bolt = |turns: f64, rows| {
+        let bolt = Bolt { length: 60e-3, thread_length: turns * 2e-3, rows, ..Bolt::iso_4014(m("M16")) };
+        good(bolt.mesh(Resolution::Segments(segments)))
+    };
+    let more = |rows| bolt(20.0, rows).faces().len() - bolt(10.0, rows).faces().len();
+    assert_eq!(more(ThreadRows::Corners), 10 * 4 * 2 * segments);
+    // Flanks are 1.25 mm wide, and chords 0.52 mm long.
+    assert_eq!(more(ThreadRows::AsChords), 10 * 6 * 2 * segments);
+    let radii = radii(&bolt(20.0, ThreadRows::Corners), [6e-3, 30e-3]);
+    near(radii[0], Size::thread(&m("M16")).minor_diameter() / 2.0, 1e-12);
+    near(radii[1], 8e-3, 1e-12);
 }

@@ -1,3 +1,5 @@
+use std::str::FromStr;
+
 use serde::{Deserialize, Serialize};
 
 use crate::base::{Inside, InsideRule, Length};
@@ -70,8 +72,32 @@ impl Sampling {
 pub enum Threshold {
     /// A length in the unit of the mesh.
     Absolute(f64),
+    /// An area in the squared unit of the mesh, by which squared distances may differ, as in the
+    /// paper's authors' program TES-Encoder. Near the surface it allows more than far from it: 1e-6
+    /// allows 1e-3 on the surface, and 5e-6 at a distance of 0.1.
+    Squared(f64),
     /// Twice the covering radius, the distance within which every point of the cell has a sample.
     CoveringRadius,
+}
+
+/// A text that is no [`Threshold`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is no threshold; expected a length of 0 or more, 'safe', or 'squared:' and an area")]
+pub struct UnknownThreshold(String);
+
+impl FromStr for Threshold {
+    type Err = UnknownThreshold;
+
+    /// A length, `safe`, or an area such as `squared:1e-6`.
+    fn from_str(text: &str) -> Result<Self, UnknownThreshold> {
+        let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| *x >= 0.0 && x.is_finite());
+        let found = match text.split_once(':') {
+            Some(("squared", area)) => number(area).map(Self::Squared),
+            _ if text == "safe" => Some(Self::CoveringRadius),
+            _ => number(text).map(Self::Absolute),
+        };
+        found.ok_or_else(|| UnknownThreshold(text.into()))
+    }
 }
 
 /// How the tetrahedra of a conforming domain are refined.

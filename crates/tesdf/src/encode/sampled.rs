@@ -24,18 +24,21 @@ pub struct SampledCell {
     pub faces: Vec<u32>,
     /// ε: how much farther than the closest face a face of E_t may be at a sample.
     pub threshold: f64,
+    /// By how much its squared distance may be greater, before `threshold` is added to its distance.
+    pub squared: f64,
 }
 
 impl SampledCell {
     /// Lines 2 to 8 of Alg. 1. `scale` is that of the local frame. The threshold of `sampling` is
     /// in the unit of the mesh.
     pub fn new(surface: &Surface, tree: &AabbTree, cell: Cell, sampling: &Sampling, scale: f64) -> Self {
-        let threshold = match sampling.threshold {
-            Threshold::Absolute(length) => length * scale,
+        let (threshold, squared) = match sampling.threshold {
+            Threshold::Absolute(length) => (length * scale, 0.0),
+            Threshold::Squared(area) => (0.0, area * scale * scale),
             // The margin covers the rounding of a gap.
-            Threshold::CoveringRadius => 2.0 * covering_radius(&cell, sampling) + surface.margin,
+            Threshold::CoveringRadius => (2.0 * covering_radius(&cell, sampling) + surface.margin, 0.0),
         };
-        Self { cell, faces: lipschitz_candidates(surface, tree, &cell), threshold }
+        Self { cell, faces: lipschitz_candidates(surface, tree, &cell), threshold, squared }
     }
 }
 
@@ -109,7 +112,7 @@ pub fn covering_radius(cell: &Cell, sampling: &Sampling) -> f64 {
 /// within the threshold of the closest face.
 pub fn sample(
     surface: &Surface,
-    SampledCell { cell, faces, threshold }: &SampledCell,
+    SampledCell { cell, faces, threshold, squared }: &SampledCell,
     sampling: &Sampling,
     scratch: &mut Scratch,
 ) -> Vec<f64> {
@@ -118,9 +121,11 @@ pub fn sample(
     pool.fill(surface, faces, cell);
     let candidates = pool.candidates();
     for point in grid(cell, sampling) {
-        let nearest = candidates.look_from(surface, point, &mut scratch.centroid);
+        let nearest = candidates.look_from(surface, point, &mut scratch.centroid).distance;
+        // Without an area, the distance itself, unrounded.
+        let from = if *squared > 0.0 { (nearest * nearest + squared).sqrt() } else { nearest };
         for (least, &distance) in least.iter_mut().zip(&scratch.centroid) {
-            if distance - nearest.distance <= *threshold {
+            if distance - from <= *threshold {
                 *least = least.min(distance);
             }
         }
@@ -175,6 +180,33 @@ mod tests {
                 .filter(|&f| distances[f as usize] < nearest + 2.0 * cell.radius())
                 .collect();
             prop_assert_eq!(lipschitz_candidates(&surface, &AabbTree::build(&boxes, 4), &cell), all);
+        }
+
+        #[test]
+        fn squared_distances_may_differ_by_the_area(
+            vertices in prop::collection::vec(point(), 3..20),
+            corners in [point(), point(), point(), point()],
+            area in prop_oneof![Just(0.0), 1e-3..0.3f64],
+        ) {
+            let faces = (0..vertices.len() as u32 - 2).map(|i| [i, i + 1, i + 2]).collect();
+            let surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0, Touching::Ignored);
+            let boxes: Vec<Aabb> = surface.triangles.iter().map(|t| Aabb::of(&t.corners)).collect();
+            let (scale, threshold) = (0.5, Threshold::Squared(area));
+            let sampling = Sampling { resolution: 3, threshold, ..Sampling::PAPER };
+            let cell = Cell { corners, depth: 0 };
+            let cell = SampledCell::new(&surface, &AabbTree::build(&boxes, 4), cell, &sampling, scale);
+            let found = sample(&surface, &cell, &sampling, &mut Scratch::default());
+            for (&f, found) in cell.faces.iter().zip(found) {
+                let squared = |f: u32, p| surface.triangles[f as usize].closest(p).distance.powi(2);
+                // How much farther the face is than the nearest one, at the sample where it is least so.
+                let more = grid(&cell.cell, &sampling).map(|p| {
+                    let nearest = cell.faces.iter().map(|&g| squared(g, p)).fold(f64::INFINITY, f64::min);
+                    squared(f, p) - nearest
+                });
+                let least = more.fold(f64::INFINITY, f64::min);
+                prop_assert!(found.is_infinite() || least <= scale * scale * area + 1e-12, "{least}");
+                prop_assert!(found.is_finite() || least >= scale * scale * area - 1e-12, "{least}");
+            }
         }
 
         #[test]

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use super::error::EncodeError;
 use super::roots::{Domain, MAX_SIZE};
 use super::{Deformation, EncodeOptions, Method, Refinement, Threshold};
-use crate::base::{Inside, InsideRule, Length, SurfaceFaces};
+use crate::base::{Inside, InsideRule, SurfaceFaces};
 use crate::mesh::{Presented, SolidMesh, Telling};
 
 /// Checks that the rule of a solid, its surface, the domain and the options fit each other.
@@ -95,10 +95,10 @@ pub fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Res
         if !(sampling.shrink > 0.0 && sampling.shrink <= 1.0) {
             return wrong("shrink", format!("{}", sampling.shrink), "above 0, at most 1");
         }
-        if let Threshold::Absolute(e) = sampling.threshold
+        if let Threshold::Absolute(e) | Threshold::Squared(e) = sampling.threshold
             && !(e >= 0.0 && e.is_finite())
         {
-            return wrong("threshold", Length::Absolute(e).to_string(), "a length of 0 or more");
+            return wrong("threshold", e.to_string(), "a length, or an area, of 0 or more");
         }
     }
     if let Domain::Bisection = domain {

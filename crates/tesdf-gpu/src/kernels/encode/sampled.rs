@@ -150,19 +150,19 @@ impl Candidate {
     }
 }
 
-/// Limit on the distance from a sample to a face that is within ε of the nearest face, which is at
-/// `nearest`.
+/// Limit on the distance from a sample to a face that is within ε of the nearest face, whose squared
+/// distance, with the allowed area, is `nearest`.
 #[cube]
 fn sample_limit(nearest: f32, threshold: f32, radius: f32) -> f32 {
-    let limit = nearest + threshold;
+    let limit = nearest.sqrt() + threshold;
     limit + ROUNDING * (radius + limit)
 }
 
 /// Limit on the distance from the center of a block to a face that is within ε of the nearest face
-/// at a sample of the block: Lemma 1 with ε.
+/// at a sample of the block: Lemma 1 with ε. `nearest` is that of the center, with the allowed area.
 #[cube]
 pub fn block_limit(nearest: f32, threshold: f32, radius: f32, reach: f32) -> f32 {
-    let limit = nearest + reach + threshold;
+    let limit = nearest.sqrt() + reach + threshold;
     limit + ROUNDING * (radius + reach + limit)
 }
 
@@ -174,6 +174,8 @@ struct Limits {
     count: usize,
     /// The threshold ε.
     threshold: f32,
+    /// The area by which squared distances may differ.
+    squared: f32,
     /// The radius R of the cell.
     radius: f32,
     /// Twice the radius of a block.
@@ -203,6 +205,7 @@ impl Samples {
             threshold: entry(&self.cells, rows).number,
             radius: entry(&self.cells, rows + 1).number,
             reach: entry(&self.cells, rows + 2).number,
+            squared: entry(&self.cells, rows + 3).number,
         }
     }
 
@@ -319,7 +322,7 @@ pub fn sample(samples: &Samples, least: &[Atomic<u32>], first_group: u32, groups
     let p = samples.point(cell, i as f32, j as f32, k as f32);
     let limits = samples.limits(cell);
     let nearest = samples.least(limits, center, &mut nearest_of);
-    let limit = block_limit(nearest.sqrt(), limits.threshold, limits.radius, limits.reach);
+    let limit = block_limit(nearest + limits.squared, limits.threshold, limits.radius, limits.reach);
     let near = Near { center, squared: limit * limit };
 
     // The tiles are processed twice: first for the smallest distance of each sample, then for the
@@ -336,7 +339,7 @@ pub fn sample(samples: &Samples, least: &[Atomic<u32>], first_group: u32, groups
         }
         sync_cube();
     }
-    let limit = sample_limit(nearest.sqrt(), limits.threshold, limits.radius);
+    let limit = sample_limit(nearest + limits.squared, limits.threshold, limits.radius);
     let limit = limit * limit;
     for tile in 0..tiles {
         if tiles > 1 {
