@@ -7,6 +7,7 @@ use tesdf::collide::{Contact, InstanceId, Mode, Pose};
 
 use super::NewtonOptions;
 use super::far_contacts::{FarContacts, Reach};
+use super::flat_patches::{Place, spanning};
 use super::normals::normals;
 use super::rows::{Bodies, Center, Row};
 use super::runs::sort_runs;
@@ -142,7 +143,8 @@ impl<'a> Gaps<'a> {
 
     /// The contacts that were detected at `poses` and have a free body, and the row of each, whose
     /// gap is the distance above the skin. Without rows are those that `reach` does not reach when
-    /// bodies go on for `time` seconds with the velocities of the beginning of the step.
+    /// bodies go on for `time` seconds with the velocities of the beginning of the step, and those of
+    /// flat patches that others span.
     pub fn find<'c>(
         &self,
         contacts: &'c [Contact],
@@ -173,12 +175,25 @@ impl<'a> Gaps<'a> {
             // Those of the detection are in the normal cones.
             Mode::Face { .. } | Mode::Exact(_) => None,
         };
+        let place = |k: usize| {
+            let contact = near[k].0;
+            let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);
+            Place { normal, point: 0.5 * (contact.point_a + contact.point_b), gap: contact.distance }
+        };
+        let spanning: Vec<bool> = (0..near.len())
+            .collect::<Vec<_>>()
+            .chunk_by(|&i, &j| near[i].1 == near[j].1)
+            .flat_map(|of_pair| spanning(&of_pair.iter().map(|&k| place(k)).collect::<Vec<_>>()))
+            .collect();
         // Others follow the rows of contacts.
         let mut rows = Vec::with_capacity(near.len() + OTHERS);
         let mut found = Vec::with_capacity(near.len());
         for (k, (contact, pair, relative)) in near.into_iter().enumerate() {
             let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);
             let Some(pair) = &pairs[pair].1 else { continue };
+            if !spanning[k] {
+                continue;
+            }
             let stiffness = self.options.stiffness;
             let Some(mut row) = Row::of_contact(contact, normal, &pair.centers, pair.friction, stiffness)
             else {

@@ -37,6 +37,7 @@ mod couplings;
 mod deep;
 mod engine;
 mod far_contacts;
+mod flat_patches;
 mod gaps;
 mod geometric;
 mod group;

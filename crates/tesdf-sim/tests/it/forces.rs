@@ -12,6 +12,7 @@ use tesdf_sim::{
 };
 
 use crate::support::bench::{Bench, Body, Kind, STEP, ball};
+use crate::support::meshes::{cuboid, tiles};
 
 const G: f64 = 9.81;
 
@@ -242,4 +243,37 @@ fn a_record_has_the_forces_of_its_steps() {
     }
     let latest: Vec<u64> = (0..10).map(|step| read.latest_forces(step).unwrap().0).collect();
     assert_eq!(latest, [0, 0, 0, 3, 3, 3, 6, 6, 6, 9]);
+}
+
+/// A block whose sides are finely meshed slides and stops as one of twelve faces, on a plane and on a mesh,
+/// and its corners alone carry it.
+#[test]
+fn flat_patches_are_carried_by_their_corners() {
+    let bench = Bench::new();
+    let half = DVec3::new(0.05, 0.05, 0.01);
+    let fine = bench.mesh("fine", &tiles(9, 0.1, 0.02));
+    let coarse = bench.mesh("coarse", &cuboid(DVec3::new(-0.05, -0.05, -0.02), DVec3::new(0.05, 0.05, 0.0)));
+    let slab = bench.cuboid(Kind::Mesh, DVec3::new(1.0, 1.0, half.z));
+    let under = Pose::at(DVec3::Z * -half.z);
+    // On a mesh also the corners of its two faces below, which are few.
+    let floors = [(Body::plane(0.3), 4), (Body { pose: under, friction: 0.3, ..Body::fixed(slab) }, 16)];
+    for (floor, most) in floors {
+        let runs = [&fine, &coarse].map(|block| {
+            let block = Body::free(block.clone(), 0.5, Pose::at(DVec3::Z * 0.02));
+            let block = Body { friction: 0.3, ..block.moving(DVec3::X * 0.6) };
+            steps("[solver]\nsleep = 0", &[floor.clone(), block], 0.5, &bench).1
+        });
+        let [fine, coarse] = runs;
+        for (k, (fine, coarse)) in fine.iter().zip(&coarse).enumerate() {
+            let [a, b] = [fine, coarse].map(|step| step.after[1].pose);
+            assert!(a.translation.distance(b.translation) < 1e-5, "{k}: {a:?} {b:?}");
+            assert!(a.rotation.angle_between(b.rotation) < 1e-4, "{k}: {a:?} {b:?}");
+            assert!(fine.report.contacts >= 100, "{k}: {}", fine.report.contacts);
+            let carrying = fine.forces.contacts.iter().filter(|c| c.force().length() > 1e-9);
+            let carrying: Vec<DVec3> = carrying.map(|c| c.force()).collect();
+            assert!((2..=most).contains(&carrying.len()), "{k}: {carrying:?}");
+        }
+        let up = fine[fine.len() - 1].forces.on(1);
+        assert!(up.distance(0.5 * G * DVec3::Z) < 1e-6 * G, "{up}");
+    }
 }
