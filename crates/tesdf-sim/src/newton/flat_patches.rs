@@ -35,12 +35,29 @@ const AFFINE: f64 = 1e-8;
 /// A corner that stands out by less than this share of the extent is none.
 const ROUNDING: f64 = 1e-12;
 
-/// Whether each contact of a pair is kept: false for contacts of flat patches that others span.
-pub fn spanning(places: &[Place]) -> Vec<bool> {
-    let mut kept = vec![true; places.len()];
-    if places.len() <= FEW {
+/// Whether each of `count` contacts is kept: false for contacts of flat patches that others span. `pair`
+/// tells of a contact which bodies it has, and `place` where it is; the contacts of two bodies have
+/// normals from the same one to the other.
+pub fn spanning<P: Copy + Ord>(
+    count: usize,
+    pair: impl Fn(usize) -> P,
+    place: impl Fn(usize) -> Place,
+) -> Vec<bool> {
+    let mut kept = vec![true; count];
+    if count <= FEW {
         return kept;
     }
+    let mut by_pair: Vec<usize> = (0..count).collect();
+    by_pair.sort_by_key(|&k| (pair(k), k));
+    for of_pair in by_pair.chunk_by(|&i, &j| pair(i) == pair(j)).filter(|of_pair| of_pair.len() > FEW) {
+        let places: Vec<Place> = of_pair.iter().map(|&k| place(k)).collect();
+        of_pair.iter().zip(kept_of_pair(&places)).for_each(|(&k, is_kept)| kept[k] = is_kept);
+    }
+    kept
+}
+
+fn kept_of_pair(places: &[Place]) -> Vec<bool> {
+    let mut kept = vec![true; places.len()];
     let first = places[0].point;
     let extent = places.iter().map(|place| place.point.distance(first)).fold(0.0, f64::max);
     let mut patches: Vec<Vec<usize>> = Vec::new();
@@ -145,13 +162,21 @@ mod tests {
     }
 
     fn kept(places: &[Place]) -> Vec<usize> {
-        spanning(places).into_iter().enumerate().filter_map(|(k, kept)| kept.then_some(k)).collect()
+        spanning(places.len(), |_| 0, |k| places[k])
+            .into_iter()
+            .enumerate()
+            .filter_map(|(k, kept)| kept.then_some(k))
+            .collect()
     }
 
     #[test]
     fn a_flat_patch_is_thinned_to_its_corners() {
         assert_eq!(kept(&grid(9, |_| 0.0)), [0, 8, 72, 80]);
         assert_eq!(kept(&grid(9, |p| 1e-3 * (p.x - 2.0 * p.y))), [0, 8, 72, 80]);
+        // Of two pairs whose contacts alternate, each keeps its own.
+        let one = grid(9, |_| 0.0);
+        let both = spanning(162, |k| k % 2, |k| one[k / 2]);
+        assert_eq!(both.iter().filter(|kept| **kept).count(), 8);
         // Coincident contacts are one corner, and a line has two.
         let mut twice = grid(9, |_| 0.0);
         twice.extend(grid(9, |_| 0.0));

@@ -178,13 +178,14 @@ impl<'a> Gaps<'a> {
         let place = |k: usize| {
             let contact = near[k].0;
             let normal = normals.as_ref().map_or(contact.normal, |normals| normals[k]);
+            let normal = if contact.instance_a < contact.instance_b { normal } else { -normal };
             Place { normal, point: 0.5 * (contact.point_a + contact.point_b), gap: contact.distance }
         };
-        let spanning: Vec<bool> = (0..near.len())
-            .collect::<Vec<_>>()
-            .chunk_by(|&i, &j| near[i].1 == near[j].1)
-            .flat_map(|of_pair| spanning(&of_pair.iter().map(|&k| place(k)).collect::<Vec<_>>()))
-            .collect();
+        let of = |k: usize| {
+            let (a, b) = ids(near[k].0);
+            (a.min(b), a.max(b))
+        };
+        let spanning = spanning(near.len(), of, place);
         // Others follow the rows of contacts.
         let mut rows = Vec::with_capacity(near.len() + OTHERS);
         let mut found = Vec::with_capacity(near.len());

@@ -255,9 +255,7 @@ fn flat_patches_are_carried_by_their_corners() {
     let coarse = bench.mesh("coarse", &cuboid(DVec3::new(-0.05, -0.05, -0.02), DVec3::new(0.05, 0.05, 0.0)));
     let slab = bench.cuboid(Kind::Mesh, DVec3::new(1.0, 1.0, half.z));
     let under = Pose::at(DVec3::Z * -half.z);
-    // On a mesh also the corners of its two faces below, which are few.
-    let floors = [(Body::plane(0.3), 4), (Body { pose: under, friction: 0.3, ..Body::fixed(slab) }, 16)];
-    for (floor, most) in floors {
+    for floor in [Body::plane(0.3), Body { pose: under, friction: 0.3, ..Body::fixed(slab) }] {
         let runs = [&fine, &coarse].map(|block| {
             let block = Body::free(block.clone(), 0.5, Pose::at(DVec3::Z * 0.02));
             let block = Body { friction: 0.3, ..block.moving(DVec3::X * 0.6) };
@@ -270,8 +268,8 @@ fn flat_patches_are_carried_by_their_corners() {
             assert!(a.rotation.angle_between(b.rotation) < 1e-4, "{k}: {a:?} {b:?}");
             assert!(fine.report.contacts >= 100, "{k}: {}", fine.report.contacts);
             let carrying = fine.forces.contacts.iter().filter(|c| c.force().length() > 1e-9);
-            let carrying: Vec<DVec3> = carrying.map(|c| c.force()).collect();
-            assert!((2..=most).contains(&carrying.len()), "{k}: {carrying:?}");
+            let carrying: Vec<DVec3> = carrying.map(|c| c.point).collect();
+            assert!((3..=4).contains(&carrying.len()), "{k}: {carrying:?}");
         }
         let up = fine[fine.len() - 1].forces.on(1);
         assert!(up.distance(0.5 * G * DVec3::Z) < 1e-6 * G, "{up}");
