@@ -192,8 +192,8 @@ pub fn time_of_impact(
         return Err(CollideError::Option { option, found: options.iterations.to_string(), expected });
     }
     let origin = start.b.placement.pose.translation;
-    let mut bodies =
-        [MovingBody::new(&start.a, motion_a, origin)?, MovingBody::new(&start.b, motion_b, origin)?];
+    let moving = |body, motion| MovingBody::new(body, motion, origin, tolerance);
+    let mut bodies = [moving(&start.a, motion_a)?, moving(&start.b, motion_b)?];
     // Small relative to the part of the tolerance that is kept.
     let exactness = tolerance / 8.0;
     let clearance = start.clearance(exactness)?;

@@ -8,7 +8,7 @@ use crate::collide::scene::error::CollideError;
 use crate::collide::scene::motion::{Motion, Twist};
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
-use crate::collide::time_of_impact::cylinder_part::CylinderPart;
+use crate::collide::time_of_impact::cylinder_part::{CylinderPart, Side};
 use crate::geometry::Triangle;
 
 /// A part of a surface.
@@ -46,16 +46,18 @@ pub struct MovingBody<'a> {
     twist: Twist,
     /// The parts of a simple shape.
     simple: Vec<Vec<DVec3>>,
+    /// The sides of the prism that stands for a cylinder.
+    side: Side,
     /// The surface lies within this distance of its parts.
     pub radius: f64,
 }
 
 impl<'a> MovingBody<'a> {
-    /// A body that is where it is at time 0.
+    /// A body that is where it is at time 0. Parts of round sides are as flat as the tolerance allows.
     ///
     /// # Errors
     /// The motion is invalid, or the body is a plane that turns.
-    pub fn new(body: &Body<'a>, motion: Motion, origin: DVec3) -> Result<Self, CollideError> {
+    pub fn new(body: &Body<'a>, motion: Motion, origin: DVec3, tolerance: f64) -> Result<Self, CollideError> {
         let Body { id, shape, placement } = *body;
         let refuse = |reason| Err(CollideError::Instance { instance: id.0, reason });
         if let Err(reason) = motion.validate() {
@@ -67,14 +69,18 @@ impl<'a> MovingBody<'a> {
                 "a plane that turns has points of any speed; expected a motion without turning".into(),
             );
         }
+        let side = match shape {
+            Shape::Cylinder { radius, .. } => Side::within(tolerance, radius * placement.scale),
+            _ => Side::within(tolerance, 0.0),
+        };
         let (simple, radius) = match shape {
             Shape::Mesh(asset) => (Vec::new(), asset.half_thickness * asset.frame.inverse_scale()),
             // A plane is the half-space of a direction, so one of its points stands for it.
             Shape::Plane => (vec![vec![DVec3::ZERO]], 0.0),
-            Shape::Cylinder { radius, .. } => (Vec::new(), radius * CylinderPart::BESIDE),
+            Shape::Cylinder { radius, .. } => (Vec::new(), radius * side.beside()),
             shape => shape.parts(),
         };
-        Ok(Self { shape, placement, motion, origin, twist, simple, radius: radius * placement.scale })
+        Ok(Self { shape, placement, motion, origin, twist, simple, side, radius: radius * placement.scale })
     }
 
     /// Whether it is a half-space.
@@ -101,7 +107,7 @@ impl<'a> MovingBody<'a> {
             }
             (Shape::Mesh(_), MovingPart::Whole) => 0,
             (Shape::Cylinder { .. }, MovingPart::Whole) => {
-                return CylinderPart::all().into_iter().map(MovingPart::OfCylinder).collect();
+                return CylinderPart::all(self.side).into_iter().map(MovingPart::OfCylinder).collect();
             }
             (_, MovingPart::OfCylinder(part)) => {
                 return part.parts().into_iter().map(MovingPart::OfCylinder).collect();

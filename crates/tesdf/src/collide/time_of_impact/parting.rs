@@ -175,7 +175,7 @@ mod tests {
             let [a, b] = [(0, a), (1, b)].map(|(k, motion)| {
                 let placement = Placement { pose: places[k], scale: 0.8 };
                 let body = Body { id: InstanceId(k as u32), shape: &shape, placement };
-                MovingBody::new(&body, motion, DVec3::X).expect("a motion")
+                MovingBody::new(&body, motion, DVec3::X, 1e-6).expect("a motion")
             });
             let pair = |time: f64| PairAt { bodies: [a.at(time), b.at(time)], radius: 0.1, time };
             for (first, second) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
