@@ -9,6 +9,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
@@ -23,6 +24,7 @@ pub mod encode_all;
 pub mod export;
 pub mod import;
 pub mod inspect;
+pub mod man;
 mod open_run;
 pub mod part;
 pub mod query;
@@ -39,9 +41,15 @@ pub mod why;
 use crate::terminal::interrupt;
 use crate::terminal::report::{self, Failure, Outcome};
 
+/// The version, with the commit where `build.rs` knows it: `0.1.0 (1234567 2026-11-29)`.
+static VERSION: LazyLock<String> = LazyLock::new(|| match option_env!("TESDF_COMMIT") {
+    Some(commit) => format!("{} ({commit})", env!("CARGO_PKG_VERSION")),
+    None => env!("CARGO_PKG_VERSION").into(),
+});
+
 /// Exact signed distances of triangle meshes.
 #[derive(Parser, Debug)]
-#[command(name = "tesdf", version, about, arg_required_else_help = true)]
+#[command(name = "tesdf", version = VERSION.as_str(), about, arg_required_else_help = true, max_term_width = 80)]
 pub struct Cli {
     /// The command.
     #[command(subcommand)]
@@ -94,6 +102,8 @@ pub enum Command {
     Export(export::Args),
     /// Print a completion script for a shell
     Completions(completions::Args),
+    /// Print a manual page, for man
+    Man(man::Args),
 }
 
 /// Runs the command in the arguments of this process.
@@ -146,6 +156,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::View(args) => view::run(args),
         Command::Export(args) => export::run(args),
         Command::Completions(args) => completions::run(args),
+        Command::Man(args) => man::run(args),
     }
 }
 
