@@ -8,13 +8,14 @@ use tesdf_sim::MassProperties;
 
 use crate::terminal::files::{self, Found, Solid};
 use crate::terminal::mesh_file::{self, CadArgs};
+use crate::terminal::parse;
 use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf check`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The mesh files.
-    #[arg(value_name = "MESH", required = true, help = mesh_file::MESH_HELP)]
+    #[arg(value_name = "MESH", required = true, help = mesh_file::MESH_HELP, value_parser = parse::mesh())]
     pub meshes: Vec<PathBuf>,
     /// How finely CAD files become triangles.
     #[command(flatten)]

@@ -23,8 +23,10 @@ use crate::why;
 #[derive(clap::Args, Debug)]
 pub struct Bodies {
     /// The .tesdf file of instance 0
+    #[arg(value_parser = parse::input())]
     pub a: PathBuf,
     /// The .tesdf file of instance 1
+    #[arg(value_parser = parse::input())]
     pub b: PathBuf,
     /// Pose of A, body to world: translation, then the unit quaternion x y z w
     #[arg(long, value_name = "\"tx ty tz qx qy qz qw\"", value_parser = parse::pose, allow_hyphen_values = true, default_value = "0 0 0 0 0 0 1", hide_default_value = true)]

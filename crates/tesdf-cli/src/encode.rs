@@ -21,6 +21,7 @@ use crate::terminal::interrupt;
 use crate::terminal::mesh_file::CadArgs;
 use crate::terminal::output;
 use crate::terminal::output::Consent;
+use crate::terminal::parse;
 use crate::terminal::progress::watched;
 use crate::terminal::report::{self, Failure, Outcome};
 
@@ -40,11 +41,11 @@ const ENCODED_HELP: &str = "Mesh file: STL, OBJ, PLY, OFF, glTF, GLB, 3MF, or ST
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The mesh file or robot description.
-    #[arg(help = ENCODED_HELP)]
+    #[arg(help = ENCODED_HELP, value_parser = parse::mesh())]
     pub mesh: PathBuf,
     /// Output file; an existing file is replaced, a pipe or device is written to. Folder of the
     /// assets and their manifest with --split and for robot descriptions
-    #[arg(short, long, value_name = "FILE|FOLDER")]
+    #[arg(short, long, value_name = "FILE|FOLDER", value_parser = parse::output())]
     pub output: PathBuf,
     /// Encode each object of the file into an asset of its own, with its name: objects of OBJ, 3MF
     /// and glTF, solids of STEP, IGES, BREP and ASCII STL; where a file has fewer than two of them,

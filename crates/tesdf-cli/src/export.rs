@@ -17,10 +17,11 @@ use crate::open_run::{self, OpenRun};
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The run, which `tesdf simulate` wrote; or a .tesdf file with a conforming domain
+    #[arg(value_parser = parse::input())]
     pub run: PathBuf,
     /// Output GLB file, or JSON file of TES-Encoder for a .tesdf file; an existing file is replaced,
     /// a pipe or device is written to
-    #[arg(short, long, value_name = "GLB")]
+    #[arg(short, long, value_name = "GLB", value_parser = parse::output())]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

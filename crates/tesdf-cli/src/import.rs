@@ -6,6 +6,7 @@ use tesdf::TeSdf;
 use tesdf::encode::ImportJsonError;
 
 use crate::terminal::output::{self, Consent};
+use crate::terminal::parse;
 use crate::terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf import`.
@@ -16,9 +17,10 @@ pub struct Args {
     /// The surface and the tetrahedra are checked: they must conform to each other, and each
     /// tetrahedron must be on the side of its group. The lists stay as they are. Nothing is proved
     /// of them, until `tesdf verify --prove` proves every cell or shows where a list misses a face.
+    #[arg(value_parser = parse::input())]
     pub file: PathBuf,
     /// Output .tesdf file; an existing file is replaced, a pipe or device is written to
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = parse::output())]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

@@ -12,13 +12,14 @@ use tesdf_sim::MassProperties;
 
 use crate::terminal::asset_file;
 use crate::terminal::files::{self, Found, Solid};
+use crate::terminal::parse;
 use crate::terminal::report::{self, Failure, Outcome, count, size};
 
 /// Arguments of `tesdf inspect`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// .tesdf files
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, value_parser = parse::input())]
     pub files: Vec<PathBuf>,
     /// Print the result as JSON: an object, or of several files a list of them
     #[arg(long)]

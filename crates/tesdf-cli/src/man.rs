@@ -32,12 +32,14 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Some(name) => {
             let command = tesdf.get_subcommands().filter(has_page).find(|command| command.get_name() == name);
             let command = command.ok_or_else(|| {
-                Failure::new(format!("there is no command {name}")).hint("tesdf man --list prints their names")
+                Failure::new(format!("there is no command {name}"))
+                    .hint("tesdf man --list prints their names")
             })?;
             // Pages are found by `man tesdf-encode`.
             clap_mangen::Man::new(command.clone()).title(format!("tesdf-{name}"))
         }
     };
+    let page = page.source(format!("tesdf {}", env!("CARGO_PKG_VERSION"))).manual("tesdf");
     let mut text = Vec::new();
     page.render(&mut text).map_err(|e| Failure::new(format!("cannot write the page: {e}")))?;
     report::result(&text)?;

@@ -16,11 +16,11 @@ use crate::terminal::report::{self, Failure, Outcome};
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The mesh file.
-    #[arg(help = mesh_file::MESH_HELP)]
+    #[arg(help = mesh_file::MESH_HELP, value_parser = parse::mesh())]
     pub mesh: PathBuf,
     /// Output file: .ply (keeps every digit), .obj or .stl; an existing file is replaced. A pipe or
     /// device is written to, as PLY unless its name has another extension
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = parse::output())]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

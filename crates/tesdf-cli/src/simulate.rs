@@ -30,12 +30,12 @@ use recorder::Recorder;
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// Scene file, TOML. With --resume it is optional, but must be the scene of the run
-    #[arg(required_unless_present = "resume")]
+    #[arg(required_unless_present = "resume", value_parser = parse::scene())]
     pub scene: Option<PathBuf>,
     /// Output file, safetensors; an existing file is replaced after the first step. Until the run
     /// is complete, the file holds the steps so far. A pipe or device is written to at the end
     /// [default: with --resume, the run itself]
-    #[arg(short, long, value_name = "RUN", required_unless_present = "resume")]
+    #[arg(short, long, value_name = "RUN", required_unless_present = "resume", value_parser = parse::output())]
     pub output: Option<PathBuf>,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

@@ -13,6 +13,7 @@ use tesdf::verify::{PrecisionReport, ProveReport, VerifyError, VerifyOptions, Ve
 
 use crate::terminal::asset_file;
 use crate::terminal::interrupt;
+use crate::terminal::parse;
 use crate::terminal::progress::Bar;
 use crate::terminal::report::{self, Failure, Outcome, count};
 
@@ -20,6 +21,7 @@ use crate::terminal::report::{self, Failure, Outcome, count};
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// A .tesdf file
+    #[arg(value_parser = parse::input())]
     pub file: PathBuf,
     /// Number of points at which the file is compared with brute force
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]

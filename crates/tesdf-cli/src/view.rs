@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::terminal::interrupt;
 use crate::terminal::output::{self, Consent};
+use crate::terminal::parse;
 use crate::terminal::progress::Bar;
 use crate::terminal::report::{self, Failure, Outcome};
 use tesdf::collide::CollideError;
@@ -16,9 +17,10 @@ use crate::open_run::{self, OpenRun};
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The run, which `tesdf simulate` wrote
+    #[arg(value_parser = parse::input())]
     pub run: PathBuf,
     /// Output HTML file; an existing file is replaced, a pipe or device is written to
-    #[arg(short, long, value_name = "HTML")]
+    #[arg(short, long, value_name = "HTML", value_parser = parse::output())]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

@@ -26,6 +26,7 @@ use crate::encode::choices::ChoiceArgs;
 use crate::terminal::interrupt;
 use crate::terminal::mesh_file::CadArgs;
 use crate::terminal::output::{self, Consent};
+use crate::terminal::parse;
 use crate::terminal::progress::Bar;
 use crate::terminal::report::{self, Failure, Outcome};
 use job::{Done, Job, State};
@@ -38,10 +39,10 @@ pub use shard::Shard;
 pub struct Args {
     /// Folder of meshes, with its subfolders, or a text file with the path of one mesh on each
     /// line; STEP, IGES and BREP files are only taken from a list
-    #[arg(value_name = "FOLDER|LIST")]
+    #[arg(value_name = "FOLDER|LIST", value_parser = parse::input())]
     pub meshes: PathBuf,
     /// Folder of the assets and the manifest; it is made if it does not exist
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", value_parser = parse::folder())]
     pub output: PathBuf,
     /// The options of the encoder.
     #[command(flatten)]

@@ -109,7 +109,7 @@ impl Unit {
 pub struct Common {
     /// Output file: .ply (keeps every digit), .obj or .stl; an existing file is replaced. A pipe or
     /// device is written to, as PLY unless its name has another extension
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = parse::output())]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

@@ -9,6 +9,7 @@ use tesdf::input;
 pub use points::{HEADER, PointsError, read, write};
 
 use crate::terminal::asset_file;
+use crate::terminal::parse;
 use crate::terminal::progress::Bar;
 use crate::terminal::report::{self, Failure, Outcome};
 
@@ -16,9 +17,10 @@ use crate::terminal::report::{self, Failure, Outcome};
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// A .tesdf file
+    #[arg(value_parser = parse::input())]
     pub file: PathBuf,
     /// CSV file with the columns x, y and z in the mesh's unit; other columns are ignored
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, value_name = "CSV", value_parser = parse::input())]
     pub points: PathBuf,
 }
 
@@ -33,6 +35,10 @@ const CHUNK: usize = 1 << 15;
 /// The asset or the points cannot be read, or stdout cannot be written. Errors in the points name
 /// the line and column.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    if args.file == args.points && args.file.starts_with("/dev/stdin") {
+        return Err(Failure::new("the asset and the points cannot both come from the standard input")
+            .hint("give one of them as a file"));
+    }
     let asset = asset_file::open(&args.file)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.points.display()));
     let bytes = input::read(&args.points).map_err(|e| at(&e))?;

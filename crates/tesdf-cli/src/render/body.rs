@@ -40,7 +40,7 @@ pub fn body_name(text: &str) -> Result<BodyName, String> {
             let [half_height, radius] = parse::numbers(sizes, "two, cylinder:HALF_HEIGHT,R")?;
             Shape::Cylinder { half_height, radius }
         }
-        _ => return Ok(BodyName::File(text.into())),
+        _ => return parse::stream(text.into(), "/dev/stdin").map(BodyName::File),
     };
     shape.validate().map_err(|e| e.to_string())?;
     Ok(BodyName::Simple(shape))

@@ -56,7 +56,7 @@ pub struct Args {
     #[arg(required_unless_present = "run", value_name = "BODY", value_parser = body_name)]
     pub bodies: Vec<BodyName>,
     /// Draw the bodies of this run, which `tesdf simulate` wrote
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["bodies", "poses"])]
+    #[arg(long, value_name = "RUN", value_parser = parse::input(), conflicts_with_all = ["bodies", "poses"])]
     pub run: Option<PathBuf>,
     /// Time in the run, s; the nearest step is drawn [default: the end of the run]
     #[arg(long, value_name = "SECONDS", value_parser = parse::number, allow_hyphen_values = true)]
@@ -70,7 +70,7 @@ pub struct Args {
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry)]
     pub geometries: Vec<(String, PathBuf)>,
     /// Output PNG file; an existing file is replaced, a pipe or device is written to
-    #[arg(short, long, value_name = "PNG")]
+    #[arg(short, long, value_name = "PNG", value_parser = parse::output())]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

@@ -30,9 +30,10 @@ use crate::terminal::{asset_file, parse};
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// A .tesdf file
+    #[arg(value_parser = parse::input())]
     pub file: PathBuf,
     /// Output PNG file; an existing file is replaced, a pipe or device is written to
-    #[arg(short, long, value_name = "PNG")]
+    #[arg(short, long, value_name = "PNG", value_parser = parse::output())]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]

@@ -23,14 +23,8 @@ impl Consent {
 /// stderr from then on.
 ///
 /// # Errors
-/// `path` is `-`, and the errors of [`Destination::new`].
+/// Those of [`Destination::new`].
 pub fn open(path: &Path, inputs: &[PathBuf], consent: Consent) -> Result<Destination, Failure> {
-    if path == Path::new("-") {
-        let message = "-: expected the name of an output file";
-        return Err(
-            Failure::new(message).hint("/dev/stdout is the standard output, and ./- a file of this name")
-        );
-    }
     let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
     let options = SaveOptions { inputs: &inputs, read_only: consent.read_only() };
     let destination = Destination::new(path, &options).map_err(failure)?;

@@ -1,10 +1,60 @@
 //! Parsers for the values of options.
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use std::path::{Path, PathBuf};
+
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use tesdf::Length;
 use tesdf::base::Named;
 use tesdf::collide::{Motion, Pose, Velocity};
 use tesdf::geometry::Aabb;
 use tesdf::glam::{DQuat, DVec3};
+
+/// Parses the name of a file that is read; `-` is the standard input.
+pub fn input() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| stream(path, "/dev/stdin"))
+}
+
+/// Parses the name of a file that is written; `-` is the standard output.
+pub fn output() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| stream(path, "/dev/stdout"))
+}
+
+/// The name of a stream in place of `-`.
+///
+/// # Errors
+/// The system has no such names.
+pub fn stream(path: PathBuf, name: &str) -> Result<PathBuf, String> {
+    match path == Path::new("-") {
+        true if cfg!(unix) => Ok(name.into()),
+        true => {
+            Err("standard input and output have no name on this system; expected the name of a file".into())
+        }
+        false => Ok(path),
+    }
+}
+
+/// Parses the name of a mesh. It is not `-`, because the extension names the format.
+pub fn mesh() -> impl TypedValueParser<Value = PathBuf> {
+    file_but_not_a_stream(
+        "the extension of the name is the format of the mesh; save it as a file first, such as part.stl",
+    )
+}
+
+/// Parses the name of a scene. It is not `-`, because the scene names its files from its own folder.
+pub fn scene() -> impl TypedValueParser<Value = PathBuf> {
+    file_but_not_a_stream("a scene names its files from its own folder; save it as a file there first")
+}
+
+/// Parses the name of a folder. It is not `-`.
+pub fn folder() -> impl TypedValueParser<Value = PathBuf> {
+    file_but_not_a_stream("expected the name of a folder; ./- is one of this name")
+}
+
+fn file_but_not_a_stream(reason: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(move |path| match path == Path::new("-") {
+        true => Err(reason),
+        false => Ok(path),
+    })
+}
 
 /// Parses a finite number.
 ///

@@ -279,10 +279,6 @@ fn files_that_cannot_be_read_or_written_are_named() {
             "error: r.step: the extension names no mesh format that can be written",
         ),
         (
-            &["repair", "cube.obj", "-o", "-"],
-            "error: -: expected the name of an output file\nhint: /dev/stdout ",
-        ),
-        (
             &["encode", "cube.obj", "-o", "c.stl"],
             "error: c.stl: the extension is that of a mesh, but an asset would be written\nhint: -o c.tesdf\n",
         ),

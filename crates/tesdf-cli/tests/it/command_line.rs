@@ -38,7 +38,8 @@ fn help_and_version_go_to_stdout() {
     let commit = text(&version.stdout).strip_prefix(&number).unwrap();
     // Without optimisation, or without git, the commit is left out.
     if commit != "\n" {
-        let words: Vec<_> = commit.strip_prefix(" (").unwrap().strip_suffix(")\n").unwrap().split(' ').collect();
+        let words: Vec<_> =
+            commit.strip_prefix(" (").unwrap().strip_suffix(")\n").unwrap().split(' ').collect();
         let [hash, date] = words[..] else { panic!("{commit}") };
         assert!(hash.len() >= 7 && hash.chars().all(|c| c.is_ascii_hexdigit()), "{commit}");
         assert!(date.len() == 10 && date.split('-').count() == 3, "{commit}");
@@ -51,7 +52,8 @@ fn help_fits_in_80_columns() {
     command.build();
     let names: Vec<_> = command.get_subcommands().map(|c| c.get_name().to_owned()).collect();
     assert!(names.len() > 15, "{names:?}");
-    let commands = names.iter().map(|name| vec![name.as_str(), "--help"]).chain([vec!["--help"], vec!["help"]]);
+    let commands =
+        names.iter().map(|name| vec![name.as_str(), "--help"]).chain([vec!["--help"], vec!["help"]]);
     for args in commands {
         let out = tesdf(&args);
         for line in text(&out.stdout).lines() {
@@ -200,6 +202,29 @@ fn completions_are_printed_and_a_closed_pipe_is_no_error() {
     drop(child.stdout.take());
     let out = child.wait_with_output().unwrap();
     assert_eq!((out.status.code(), text(&out.stderr)), (Some(0), ""));
+}
+
+#[test]
+fn each_command_has_a_manual_page() {
+    let names = tesdf(&["man", "--list"]);
+    let names: Vec<_> = text(&names.stdout).lines().collect();
+    assert!(names.len() > 15 && names.contains(&"encode-all") && !names.contains(&"help"), "{names:?}");
+    for args in names.iter().map(|name| vec!["man", name]).chain([vec!["man"]]) {
+        let out = tesdf(&args);
+        let page = text(&out.stdout);
+        let title = if args.len() == 2 { format!(".TH tesdf-{} 1 ", args[1]) } else { ".TH tesdf 1 ".into() };
+        assert!(
+            out.status.success() && page.contains(&title) && page.contains(".SH SYNOPSIS"),
+            "{args:?}: {page}"
+        );
+    }
+    let out = tesdf(&["man", "nothing"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(
+        text(&out.stderr).starts_with("error: there is no command nothing\nhint: "),
+        "{}",
+        text(&out.stderr)
+    );
 }
 
 /// The parts of a text between `` ` ``.

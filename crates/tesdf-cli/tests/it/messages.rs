@@ -77,10 +77,68 @@ fn an_asset_comes_through_a_pipe() {
     let (code, _, err) = piped("cat none.tesdf", "clearance /dev/stdin none.tesdf");
     assert_eq!(code, Some(0), "{err}");
     // An endless stream must not be read to its end.
+    for args in [
+        &["query", "none.tesdf", "--points"][..],
+        &["simulate", "-o", "x"],
+        &["view", "-o", "x"],
+        &["import", "-o", "x"],
+    ] {
+        let (code, _, err) = folder.tesdf(&[args, &["/dev/zero"]].concat());
+        assert!(code == Some(2) && err.contains("bytes came from it"), "{args:?}: {err}");
+    }
     let (code, _, err) = piped("cat /dev/zero", "verify /dev/stdin");
     assert!(code == Some(2) && err.contains("not a .tesdf file"), "{err}");
     let (code, out, _) = piped("head -c 3000 none.tesdf", "verify /dev/stdin");
     assert!(code == Some(1) && out.starts_with("failed: /dev/stdin: "), "{out}");
+}
+
+#[test]
+fn a_minus_is_a_stream_and_never_a_file() {
+    let folder = cubes(&[]);
+    folder.write("p.csv", "x,y,z\n1,1,1.5\n");
+    folder.write("list", "c.obj\n");
+    let shell = |script: &str| {
+        let mut shell = Command::new("sh");
+        shell.env("TESDF_CACHE", "").env("T", crate::folder::BINARY);
+        shell.args(["-c", script]).current_dir(folder.path(""));
+        texts(shell.output().unwrap())
+    };
+    let answer = folder.good(&["query", "none.tesdf", "--points", "p.csv"]);
+    assert!(answer.contains(",-0.5,"), "{answer}");
+    for script in [
+        "$T query none.tesdf --points - <p.csv",
+        "$T query - --points p.csv <none.tesdf",
+        "$T encode c.obj --preset fast -o - | $T query - --points p.csv",
+        "$T repair c.obj -o - >r.ply; $T encode r.ply -o r.tesdf >log; $T query r.tesdf --points p.csv",
+    ] {
+        let (code, out, err) = shell(script);
+        assert_eq!((code, out.as_str()), (Some(0), answer.as_str()), "{script}: {err}");
+    }
+    for (script, expected) in [
+        ("$T inspect - --json <none.tesdf", "\"file\": \"/dev/stdin\""),
+        ("$T verify - --samples 50 <none.tesdf", "passed"),
+        ("$T collide - none.tesdf --pose-b '5 0 0 0 0 0 1' --json <none.tesdf", "[]"),
+        ("$T slice - -o - <none.tesdf | head -c 4 | tail -c 3", "PNG"),
+        ("$T render - -o - <none.tesdf | head -c 4 | tail -c 3", "PNG"),
+        ("$T part peg -o - | head -n 1", "ply"),
+        ("$T encode-all - -o all <list", "1 now"),
+    ] {
+        let (code, out, err) = shell(script);
+        assert!(code == Some(0) && out.contains(expected), "{script}: {out}{err}");
+    }
+    for (args, expected) in [
+        (&["check", "-"][..], "the extension of the name is the format of the mesh; save it as a file first"),
+        (&["encode", "-", "-o", "x"], "the extension of the name is the format"),
+        (&["repair", "-", "-o", "x"], "the extension of the name is the format"),
+        (&["simulate", "-", "-o", "x"], "a scene names its files from its own folder"),
+        (&["encode-all", "list", "-o", "-"], "expected the name of a folder"),
+        (&["query", "-", "--points", "-"], "cannot both come from the standard input"),
+    ] {
+        let (code, out, err) = folder.tesdf(args);
+        assert_eq!((code, out.as_str()), (Some(2), ""), "{args:?}");
+        assert!(err.contains(expected), "{args:?}: {err}");
+    }
+    assert!(!folder.names().contains(&"-".to_string()), "{:?}", folder.names());
 }
 
 #[test]
