@@ -9,7 +9,7 @@ if ! command -v cargo >/dev/null; then
     echo "hint: install Rust 1.95 or newer: curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y" >&2
     exit 2
 fi
-if ! command -v cc >/dev/null; then
+if [ "${OS:-}" != Windows_NT ] && ! command -v cc >/dev/null; then
     echo "error: cc was not found; Rust needs it to link" >&2
     echo "hint: on Debian or Ubuntu: apt-get install build-essential" >&2
     exit 2

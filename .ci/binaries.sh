@@ -1,0 +1,96 @@
+#!/usr/bin/env bash
+# Makes the archives of the tool `tesdf` of a release, with the GPU, in target/binaries: by default for Linux on
+# x86-64 and on ARM, elsewhere for this machine, or for the targets that are named:
+#
+#     .ci/binaries.sh [TARGET…]
+#
+# An archive has the program, its manual and completions, the changelog, the texts of all licences, and the list of
+# the crates in it (CycloneDX). The same commit and compiler give the same bytes.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. .ci/toolchain.sh
+. .ci/release_tools.sh
+
+binaries=$PWD/target/binaries
+version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml)
+targets=("$@")
+if [ $# = 0 ]; then
+    case $host in
+    *-linux-gnu) targets=(x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu) ;;
+    *) targets=("$host") ;;
+    esac
+fi
+mkdir -p "$binaries"
+SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
+export SOURCE_DATE_EPOCH
+
+# The list of crates in the program, by a tool of cargo.
+cyclonedx=0.5.9
+if [ "$(target/tools/bin/cargo-cyclonedx cyclonedx --version 2>/dev/null)" != "cargo-cyclonedx-cyclonedx $cyclonedx" ]; then
+    CARGO_PROFILE_DEV_DEBUG=0 step "binaries" cargo install --quiet --locked --debug --root target/tools "cargo-cyclonedx@$cyclonedx"
+fi
+
+# pack FOLDER: its archive, with one time and owner for all files.
+pack() {
+    case $1 in
+    *-windows-*)
+        rm -f "$1.zip"
+        find "$1" -type f -exec touch --date="@$SOURCE_DATE_EPOCH" {} +
+        "$release_bin/python" -c 'import shutil, sys; shutil.make_archive(sys.argv[1], "zip", ".", sys.argv[1])' "$1" ;;
+    *-darwin) tar -czf "$1.tar.gz" "$1" ;;
+    *)  tar --sort=name --mtime="@$SOURCE_DATE_EPOCH" --owner=0 --group=0 --numeric-owner --mode=go=rX,u+rw -cf - "$1" |
+            gzip -n -9 >"$1.tar.gz" ;;
+    esac
+}
+
+for target in "${targets[@]}"; do
+    if command -v rustup >/dev/null; then
+        rustup --quiet target add "$target"
+    fi
+    options=(--quiet --locked --release -p tesdf-cli --features gpu)
+    # The oldest C library that Rust itself runs with, as for the wheels.
+    case $target in
+    *-linux-*) step "binaries" cargo zigbuild "${options[@]}" --target "$target.2.17" ;;
+    *) step "binaries" cargo build "${options[@]}" --target "$target" ;;
+    esac
+    extension=
+    case $target in *-windows-*) extension=.exe ;; esac
+    program=${CARGO_TARGET_DIR:-$PWD/target}/$target/release/tesdf$extension
+
+    name=tesdf-$version-$target
+    folder=$binaries/$name
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    cp "$program" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$folder"
+    .ci/licences.py tesdf-cli "$target" gpu >"$folder/THIRD-PARTY-LICENCES.txt"
+    target/tools/bin/cargo-cyclonedx cyclonedx --quiet --manifest-path crates/tesdf-cli/Cargo.toml --features gpu \
+        --target "$target" --format json --spec-version 1.5 --override-filename sbom
+    find crates python -maxdepth 2 -name sbom.json ! -path 'crates/tesdf-cli/*' -delete
+    mv crates/tesdf-cli/sbom.json "$folder/tesdf.cdx.json"
+
+    # The manual and completions are those of every target.
+    case $target in
+    "$host")
+        "$program" --version | tee /dev/stderr | grep -q "($(git log -1 --abbrev=7 --format='%h %cs'))" ||
+            { echo "error: tesdf --version does not name this commit" >&2; exit 1; }
+        rm -rf "$binaries/texts"
+        mkdir -p "$binaries/texts/man" "$binaries/texts/completions"
+        for shell in bash elvish fish powershell zsh; do
+            "$program" completions "$shell" >"$binaries/texts/completions/tesdf.$shell"
+        done
+        "$program" man >"$binaries/texts/man/tesdf.1"
+        for command in $("$program" man --list); do
+            "$program" man "$command" >"$binaries/texts/man/tesdf-$command.1"
+        done ;;
+    esac
+    if [ -d "$binaries/texts" ]; then
+        cp -R "$binaries/texts/." "$folder"
+    else
+        echo "error: $host makes the manual; name it before $target" >&2
+        exit 1
+    fi
+    (cd "$binaries" && pack "$name")
+    rm -rf "$folder"
+done
+rm -rf "$binaries/texts"
+.ci/checksums.sh "$binaries"
