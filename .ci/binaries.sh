@@ -65,8 +65,10 @@ for target in "${targets[@]}"; do
     .ci/licences.py tesdf-cli "$target" gpu >"$folder/THIRD-PARTY-LICENCES.txt"
     target/tools/bin/cargo-cyclonedx cyclonedx --quiet --manifest-path crates/tesdf-cli/Cargo.toml --features gpu \
         --target "$target" --format json --spec-version 1.5 --override-filename sbom
-    find crates python -maxdepth 2 -name sbom.json ! -path 'crates/tesdf-cli/*' -delete
-    mv crates/tesdf-cli/sbom.json "$folder/tesdf.cdx.json"
+    # No path of this machine, and no random number.
+    sed -e "s,file://$PWD/,file:///,g" -e '/"serialNumber"/d' crates/tesdf-cli/sbom.json >"$folder/tesdf.cdx.json"
+    # It writes one beside each manifest.
+    find crates python -maxdepth 2 -name sbom.json -delete
 
     # The manual and completions are those of every target.
     case $target in
