@@ -1,6 +1,6 @@
-//! Tells the tool of which commit it is, for `tesdf --version`: in `TESDF_COMMIT`, its short hash and
-//! date. Builds without optimisation name none, so that a commit makes cargo build nothing again. Neither
-//! do builds from a package, which is no checkout.
+//! Tells the tool of which commit it is, for `tesdf --version`: in `TESDF_COMMIT`, its short hash
+//! and date. Builds without optimisation name none, so that a commit makes cargo build nothing
+//! again. Neither do builds from a package, which is no checkout.
 use std::path::Path;
 use std::process::Command;
 

@@ -111,8 +111,8 @@ pub use base::{Certificate, Length, Progress, Side, Stage};
 #[cfg(feature = "collide")]
 pub use collide::{
     Clearance, ClearanceOptions, CollideOptions, Contact, Contacts, ContactsPer, FaceOptions, Impact,
-    Instance, InstanceId, Mode, Motion, Pose, Reduction, Scene, Shape, ShapeId, TimeOfImpact,
-    TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
+    Instance, InstanceId, InstancePairs, Mode, Motion, Pose, Reduction, Scene, Shape, ShapeId, TimeOfImpact,
+    TimeOfImpactOptions, Velocity, clearance, detect, detect_with, time_of_impact,
 };
 #[cfg(feature = "encode")]
 pub use encode::{Domain, EncodeOptions, Encoder, Preset};
