@@ -1,4 +1,5 @@
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 use tesdf::glam::DVec3;
 
 use crate::error::{PartError, above, below, positive};
@@ -176,7 +177,7 @@ impl Hexagon {
 
     /// The curve in which the cone of the chamfer that ends at the height `z` cuts the sides.
     pub(crate) fn chamfer(&self, surface: &mut Surface, z: f64, end: Facing) -> Loop {
-        let slope = 30f64.to_radians().tan();
+        let slope = elementary::tan(30f64.to_radians());
         let begins = self.chamfered();
         self.ring(surface, |radius| {
             let drop = (radius - begins) * slope;

@@ -1,6 +1,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 use tesdf::glam::{DVec2, DVec3};
 
 use crate::error::{PartError, above, positive};
@@ -63,7 +64,8 @@ impl ChainLink {
         let mut rings = Vec::new();
         let mut ring = |centre: DVec2, out: DVec2| {
             let points = angles(around).map(|angle| {
-                (centre + out * (wire * angle.cos())).extend(0.0) + DVec3::Z * (wire * angle.sin())
+                (centre + out * (wire * elementary::cos(angle))).extend(0.0)
+                    + DVec3::Z * (wire * elementary::sin(angle))
             });
             rings.push(surface.curve(points.collect::<Vec<_>>()));
         };

@@ -1,6 +1,7 @@
 use std::f64::consts::PI;
 
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 
 use crate::dogs::{self, Dogs};
 use crate::error::{PartError, above, below, positive};
@@ -94,7 +95,7 @@ impl Gear {
         self.teeth.check()?;
         positive("width", self.width)?;
         // Chords of a circle come nearer to the axis than the circle.
-        let inside = |radius: f64| radius * (PI / resolution.turn(radius, 1) as f64).cos();
+        let inside = |radius: f64| radius * elementary::cos(PI / resolution.turn(radius, 1) as f64);
         let mut outer = inside(self.teeth.root_radius());
         if let Some(hub) = self.hub {
             positive("height of the hub", hub.height)?;

@@ -1,6 +1,7 @@
 //! The outline of an involute spur gear, as a rack with rounded tips generates it.
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use tesdf::base::elementary;
 use tesdf::glam::DVec2;
 
 use crate::error::{PartError, below, count, not_negative, positive};
@@ -36,7 +37,7 @@ impl Teeth {
 
     /// Radius of the circle whose involutes the flanks are, in metres.
     pub fn base_radius(&self) -> f64 {
-        self.pitch_radius() * PRESSURE_ANGLE.cos()
+        self.pitch_radius() * elementary::cos(PRESSURE_ANGLE)
     }
 
     /// Radius of the tips, in metres.
@@ -51,10 +52,11 @@ impl Teeth {
 
     /// Half of the angle that a tooth takes at a radius from the base circle on.
     fn half_tooth(&self, radius: f64) -> f64 {
-        let thickness =
-            self.module * (FRAC_PI_2 + 2.0 * self.profile_shift * PRESSURE_ANGLE.tan()) - self.backlash;
-        let involute = |angle: f64| angle.tan() - angle;
-        let here = (self.base_radius() / radius).min(1.0).acos();
+        let thickness = self.module
+            * (FRAC_PI_2 + 2.0 * self.profile_shift * elementary::tan(PRESSURE_ANGLE))
+            - self.backlash;
+        let involute = |angle: f64| elementary::tan(angle) - angle;
+        let here = elementary::acos((self.base_radius() / radius).min(1.0));
         thickness / (2.0 * self.pitch_radius()) + involute(PRESSURE_ANGLE) - involute(here)
     }
 
@@ -62,7 +64,8 @@ impl Teeth {
     /// from the middle of the rack's tooth.
     fn rounding(&self) -> [f64; 2] {
         let depth = DEDENDUM - FILLET;
-        let half_width = PI / 4.0 - depth * PRESSURE_ANGLE.tan() - FILLET / PRESSURE_ANGLE.cos();
+        let half_width =
+            PI / 4.0 - depth * elementary::tan(PRESSURE_ANGLE) - FILLET / elementary::cos(PRESSURE_ANGLE);
         [(depth - self.profile_shift) * self.module, half_width * self.module + self.backlash / 2.0]
     }
 
@@ -75,12 +78,12 @@ impl Teeth {
         let point = centre + FILLET * self.module * centre.normalize();
         let turned = (along - half_width) / pitch;
         let from_centre = DVec2::new(point.x, point.y + pitch);
-        [from_centre.length(), from_centre.x.atan2(from_centre.y) - turned]
+        [from_centre.length(), elementary::atan2(from_centre.x, from_centre.y) - turned]
     }
 
     /// Where the fillet meets the flank.
     fn fillet_end(&self) -> f64 {
-        self.rounding()[0] / PRESSURE_ANGLE.tan()
+        self.rounding()[0] / elementary::tan(PRESSURE_ANGLE)
     }
 
     pub(crate) fn check(&self) -> Result<(), PartError> {
@@ -91,7 +94,7 @@ impl Teeth {
         below("backlash", backlash, 0.3 * module, ", 0.3 modules")?;
         // The flank of the rack ends one module below its middle. Beyond the base circle's tangent
         // point it would cut the flanks it has made.
-        let least = ADDENDUM - teeth as f64 / 2.0 * PRESSURE_ANGLE.sin().powi(2);
+        let least = ADDENDUM - teeth as f64 / 2.0 * elementary::powi(elementary::sin(PRESSURE_ANGLE), 2);
         let parameter = |expected: String| PartError::Parameter {
             name: "profile shift",
             found: format!("{profile_shift} modules"),
@@ -134,7 +137,7 @@ impl Teeth {
     /// Radii of the flank, from the fillet to the tip, at equal steps of the angle of roll.
     fn flank(&self, from: f64, resolution: Resolution) -> impl Iterator<Item = f64> {
         let base = self.base_radius();
-        let roll = |radius: f64| ((radius / base).powi(2) - 1.0).max(0.0).sqrt();
+        let roll = |radius: f64| (elementary::powi(radius / base, 2) - 1.0).max(0.0).sqrt();
         let [first, last] = [from, self.tip_radius()].map(roll);
         let segments = match resolution {
             Resolution::Segments(segments) => segments.div_ceil(12).max(2),
@@ -148,7 +151,7 @@ impl Teeth {
         (0..=segments).map(move |i| match i {
             0 => from,
             i if i == segments => tip,
-            i => base * (first + (last - first) * i as f64 / segments as f64).hypot(1.0),
+            i => base * elementary::hypot(first + (last - first) * i as f64 / segments as f64, 1.0),
         })
     }
 

@@ -1,6 +1,7 @@
 use std::f64::consts::PI;
 
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 use tesdf::glam::{DVec2, DVec3};
 
 use crate::error::{PartError, above, below, count, not_negative, positive, wrong};
@@ -30,11 +31,11 @@ impl Lobes {
     }
 
     fn at(&self, angle: f64) -> f64 {
-        self.radius + self.amplitude * (self.count as f64 * angle).cos()
+        self.radius + self.amplitude * elementary::cos(self.count as f64 * angle)
     }
 
     fn normal(&self, angle: f64) -> DVec2 {
-        let slope = -self.amplitude * self.count as f64 * (self.count as f64 * angle).sin();
+        let slope = -self.amplitude * self.count as f64 * elementary::sin(self.count as f64 * angle);
         let direction = DVec2::from_angle(angle);
         (self.at(angle) * direction - slope * direction.perp()).normalize()
     }
@@ -190,8 +191,8 @@ impl LobedHole {
         let most = lobes.narrowest() - distance;
         below("chamfer", chamfer, most, ", the radius of curvature between the lobes less the clearance")?;
         let mouth = lobes.radius + lobes.amplitude + distance + chamfer;
-        if outer_radius * (PI / segments as f64).cos() <= mouth {
-            let least = mouth / (PI / segments as f64).cos();
+        if outer_radius * elementary::cos(PI / segments as f64) <= mouth {
+            let least = mouth / elementary::cos(PI / segments as f64);
             return Err(wrong(
                 "outer radius",
                 outer_radius,

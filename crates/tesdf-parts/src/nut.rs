@@ -1,6 +1,7 @@
 use std::f64::consts::PI;
 
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 
 use crate::bolt::Hexagon;
 use crate::error::{PartError, above};
@@ -60,7 +61,7 @@ impl Nut {
         let Self { thread, height, across_flats, clearance, .. } = *self;
         let segments = thread.segments(resolution);
         let mut surface = Surface::new("nut");
-        let outwards = 1.0 / (PI / segments as f64).cos();
+        let outwards = 1.0 / elementary::cos(PI / segments as f64);
         let mouth = self.mouth();
         let [bottom, top] = Helix {
             columns: segments,
@@ -99,7 +100,7 @@ impl Nut {
         self.thread.check(self.clearance)?;
         above("height", self.height, self.thread.pitch, ", the pitch")?;
         let widest = self.thread.segments(resolution) as f64;
-        let mouth = 2.0 * self.mouth() / (PI / widest).cos();
+        let mouth = 2.0 * self.mouth() / elementary::cos(PI / widest);
         above("width across flats", 0.95 * self.across_flats, mouth, ", the diameter of the countersink")?;
         above("height", self.height, 0.12 * self.across_flats, ", the height of its two chamfers")
     }

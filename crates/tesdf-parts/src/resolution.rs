@@ -1,5 +1,7 @@
 use std::f64::consts::TAU;
 
+use tesdf::base::elementary;
+
 use crate::error::{Mm, PartError, count};
 
 /// How finely curves become chords.
@@ -25,7 +27,7 @@ impl Resolution {
         match self {
             Self::Segments(segments) => count("number of segments", segments, FEWEST..=MOST)?,
             Self::Deviation(deviation) => {
-                let least = radius * (1.0 - (TAU / 2.0 / MOST as f64).cos());
+                let least = radius * (1.0 - elementary::cos(TAU / 2.0 / MOST as f64));
                 if !(deviation > 0.0 && deviation.is_finite()) || deviation < least {
                     // Rounded up to the last digit that is printed.
                     let least = Mm((least * 1e9).ceil() * 1e-9);
@@ -48,7 +50,7 @@ impl Resolution {
             Self::Segments(segments) => segments,
             // The distance of a chord of angle 2a from its arc is r (1 - cos a).
             Self::Deviation(deviation) if deviation < radius => {
-                (TAU / 2.0 / (1.0 - deviation / radius).acos()).ceil() as usize
+                (TAU / 2.0 / elementary::acos(1.0 - deviation / radius)).ceil() as usize
             }
             Self::Deviation(_) => FEWEST,
         };

@@ -1,6 +1,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 use tesdf::glam::DVec3;
 
 use crate::error::{PartError, above, below, not_negative, positive};
@@ -267,12 +268,15 @@ fn keyed(
     let end: Vec<[f64; 2]> = (0..=steps)
         .map(|j| {
             let angle = PI * (1.0 - j as f64 / steps as f64);
-            [half * angle.cos(), if j == 0 || j == steps { 0.0 } else { half * angle.sin() }]
+            [
+                half * elementary::cos(angle),
+                if j == 0 || j == steps { 0.0 } else { half * elementary::sin(angle) },
+            ]
         })
         .collect();
-    let angle_of = |x: f64| (x / radius).asin() - FRAC_PI_2;
+    let angle_of = |x: f64| elementary::asin(x / radius) - FRAC_PI_2;
     let edge = angle_of(half);
-    let rest = TAU - 2.0 * (half / radius).asin();
+    let rest = TAU - 2.0 * elementary::asin(half / radius);
     let others = resolution.arc(radius, rest);
     let mut angles: Vec<f64> = end.iter().map(|&[x, _]| angle_of(x)).collect();
     angles.extend((1..others).map(|i| edge + rest * i as f64 / others as f64));

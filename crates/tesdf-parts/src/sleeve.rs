@@ -1,6 +1,7 @@
 use std::f64::consts::PI;
 
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 
 use crate::dogs::{self, Dogs};
 use crate::error::{PartError, above, below, positive};
@@ -81,7 +82,7 @@ impl Sleeve {
         positive("depth of the groove", self.groove_depth)?;
         above("width", self.width, self.groove_width, ", the width of the groove")?;
         self.bore.check()?;
-        let inside = |radius: f64| radius * (PI / resolution.turn(radius, 1) as f64).cos();
+        let inside = |radius: f64| radius * elementary::cos(PI / resolution.turn(radius, 1) as f64);
         let inner = self.bore.radius();
         let left = inside(self.diameter / 2.0) - inner;
         below("depth of the groove", self.groove_depth, left, ", the thickness of the body")?;

@@ -1,5 +1,6 @@
 use std::f64::consts::{PI, TAU};
 
+use tesdf::base::elementary;
 use tesdf::glam::DVec2;
 
 use crate::error::{PartError, above, below, count, not_negative, positive};
@@ -36,7 +37,7 @@ impl Spline {
             ", its minor diameter",
         )?;
         positive("width of the spline teeth", self.width)?;
-        let space = self.minor_diameter * (PI / self.count as f64).sin();
+        let space = self.minor_diameter * elementary::sin(PI / self.count as f64);
         below("width of the spline teeth", self.width, 0.9 * space, ", nine tenths of their pitch")
     }
 
@@ -45,7 +46,7 @@ impl Spline {
         let [minor, major] = [self.minor_diameter, self.major_diameter].map(|d| d / 2.0 + distance);
         let half = self.width / 2.0 + distance;
         let pitch = TAU / self.count as f64;
-        let [foot, tip] = [minor, major].map(|radius| (half / radius).asin());
+        let [foot, tip] = [minor, major].map(|radius| elementary::asin(half / radius));
         let tip_segments = resolution.arc(major, 2.0 * tip).next_multiple_of(2);
         let foot_segments = resolution.arc(minor, pitch - 2.0 * foot).max(1);
         let arc = |radius: f64, from: f64, to: f64, segments: usize| {

@@ -1,4 +1,5 @@
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 use tesdf::glam::DVec3;
 
 use crate::error::{PartError, above, below, positive};
@@ -49,17 +50,17 @@ impl Spoon {
 
     /// The section at a share of the length, from 0 to 1.
     fn section(&self, along: f64) -> Oval {
-        let bump = |width: f64| (-((along - BOWL[0]) / width).powi(2)).exp();
-        let ends = |power: i32| (1.0 - (2.0 * along - 1.0).powi(power)).max(0.0).sqrt();
-        let knob = 0.86 * (-((along - 0.93) / 0.08).powi(2)).exp();
+        let bump = |width: f64| elementary::exp(-elementary::powi((along - BOWL[0]) / width, 2));
+        let ends = |power: i32| (1.0 - elementary::powi(2.0 * along - 1.0, power)).max(0.0).sqrt();
+        let knob = 0.86 * elementary::exp(-elementary::powi((along - 0.93) / 0.08, 2));
         let handle = self.handle_width / 2.0;
         // The ends narrow the middle of the bowl a little, too.
-        let narrowed = (1.0 - (1.0 - 2.0 * BOWL[0]).powi(8)).sqrt();
+        let narrowed = (1.0 - elementary::powi(1.0 - 2.0 * BOWL[0], 8)).sqrt();
         let bowl = self.bowl_width / 2.0 / narrowed - handle;
         Oval {
             half_width: (handle * (1.0 + knob) + bowl * bump(BOWL[1])) * ends(8),
             depth: self.bowl_depth * bump(BOWL[1] + 0.01),
-            height: self.length * (0.0875 * along * along + 0.0375 * (3.0 * along).sin()),
+            height: self.length * (0.0875 * along * along + 0.0375 * elementary::sin(3.0 * along)),
             half_thickness: self.thickness / 2.0 * ((1.0 + 1.75 * along) * ends(16) + 0.05),
         }
     }
@@ -74,17 +75,18 @@ impl Spoon {
         let along = around;
         let mut surface = Surface::new("spoon");
         // Close together at both ends, where the outline is round.
-        let shares = (1..along).map(|i| (1.0 - (std::f64::consts::PI * i as f64 / along as f64).cos()) / 2.0);
+        let shares =
+            (1..along).map(|i| (1.0 - elementary::cos(std::f64::consts::PI * i as f64 / along as f64)) / 2.0);
         let rings: Vec<_> = shares
             .map(|share| {
                 let oval = self.section(share);
                 surface.curve(angles(around).map(|angle| {
-                    let across = angle.cos();
+                    let across = elementary::cos(angle);
                     let bottom = oval.height - oval.depth * (1.0 - across * across);
                     DVec3::new(
                         share * self.length,
                         oval.half_width * across,
-                        bottom + oval.half_thickness * angle.sin(),
+                        bottom + oval.half_thickness * elementary::sin(angle),
                     )
                 }))
             })

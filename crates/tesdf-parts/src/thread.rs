@@ -2,6 +2,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use tesdf::base::elementary;
+
 use crate::error::{PartError, below, not_negative, positive};
 use crate::resolution::Resolution;
 
@@ -46,7 +48,7 @@ impl Thread {
     /// Phases of the rows of vertices of one pitch.
     pub(crate) fn rows(&self, divided: ThreadRows, segments: usize) -> Vec<f64> {
         let chord = std::f64::consts::PI * self.diameter / segments as f64;
-        let flank = self.depth() / 30f64.to_radians().cos();
+        let flank = self.depth() / elementary::cos(30f64.to_radians());
         let pieces = [
             (-1.0 / 16.0, 1.0 / 16.0, self.pitch / 8.0),
             (1.0 / 16.0, 3.0 / 8.0, flank),

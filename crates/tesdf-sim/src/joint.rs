@@ -1,8 +1,9 @@
 //! Joints between two bodies, or a body and the world, and the motors that drive them.
 use std::f64::consts::{PI, TAU};
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 
 /// What a joint lets a body do relative to its parent.
@@ -127,7 +128,8 @@ impl Joint {
         match self.kind {
             _ if coordinate == 0.0 => {}
             JointKind::Hinge if coordinate.abs() <= PI => {
-                child.rotation = (child.rotation * DQuat::from_rotation_z(coordinate)).normalize();
+                child.rotation =
+                    (child.rotation * elementary::from_axis_angle(DVec3::Z, coordinate)).normalize();
             }
             JointKind::Slider if coordinate.is_finite() => {
                 child.translation += child.rotation * DVec3::Z * coordinate;
@@ -160,7 +162,7 @@ impl Joint {
             JointKind::Ball => swing(a, b).length(),
             JointKind::Hinge => {
                 let turned = a.rotation.inverse() * (b.rotation * DVec3::X);
-                turned.y.atan2(turned.x)
+                elementary::atan2(turned.y, turned.x)
             }
             JointKind::Slider => (a.rotation * DVec3::Z).dot(b.translation - a.translation),
         }
@@ -255,7 +257,7 @@ pub fn rotation_between(a: Pose, b: Pose) -> DVec3 {
     let q = if q.w < 0.0 { -q } else { q };
     // Of small angles the sine keeps all digits.
     let sine = q.xyz().length();
-    if sine == 0.0 { DVec3::ZERO } else { q.xyz() * (2.0 * sine.atan2(q.w) / sine) }
+    if sine == 0.0 { DVec3::ZERO } else { q.xyz() * (2.0 * elementary::atan2(sine, q.w) / sine) }
 }
 
 /// The smallest rotation that takes the z axis of `a` to that of `b`, as a rotation vector in the
@@ -263,7 +265,7 @@ pub fn rotation_between(a: Pose, b: Pose) -> DVec3 {
 pub(crate) fn swing(a: Pose, b: Pose) -> DVec3 {
     let [from, to] = [a, b].map(|pose| pose.rotation * DVec3::Z);
     let sine = from.cross(to);
-    let angle = sine.length().atan2(from.dot(to));
+    let angle = elementary::atan2(sine.length(), from.dot(to));
     match sine.try_normalize() {
         Some(axis) => axis * angle,
         None if angle > 1.0 => (a.rotation * DVec3::X) * PI,
@@ -289,6 +291,8 @@ pub(crate) fn axes(frame: Pose) -> [DVec3; 3] {
 
 #[cfg(test)]
 mod tests {
+    use glam::DQuat;
+
     use super::*;
 
     #[test]

@@ -8,6 +8,7 @@ use glam::{DMat3, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen};
 use tesdf::TeSdf;
 use tesdf::base::InsideRule;
+use tesdf::base::elementary;
 use tesdf::collide::Shape;
 
 use by_distance::by_distance;
@@ -101,7 +102,7 @@ impl MassProperties {
                 Self::on_axes(mass, mass / 3.0 * (DVec3::splat(square.element_sum()) - square))
             }
             Shape::Sphere { radius: r } => {
-                let mass = 4.0 / 3.0 * PI * r.powi(3);
+                let mass = 4.0 / 3.0 * PI * elementary::powi(*r, 3);
                 Self::on_axes(mass, DVec3::splat(0.4 * mass * r * r))
             }
             Shape::Cylinder { half_height: l, radius: r } => {
@@ -110,7 +111,7 @@ impl MassProperties {
                 Self::on_axes(mass, DVec3::new(across, across, mass * r * r / 2.0))
             }
             Shape::Capsule { half_height: l, radius: r } => {
-                let (cylinder, sphere) = (2.0 * PI * r * r * l, 4.0 / 3.0 * PI * r.powi(3));
+                let (cylinder, sphere) = (2.0 * PI * r * r * l, 4.0 / 3.0 * PI * elementary::powi(*r, 3));
                 let along = cylinder * r * r / 2.0 + sphere * 0.4 * r * r;
                 // A half sphere's centre lies 3/8 r from its base.
                 let across =
@@ -120,9 +121,9 @@ impl MassProperties {
         };
         check("density", density)?;
         Ok(Self {
-            mass: unit.mass * density * scale.powi(3),
+            mass: unit.mass * density * elementary::powi(scale, 3),
             center: unit.center * scale,
-            inertia: unit.inertia * (density * scale.powi(5)),
+            inertia: unit.inertia * (density * elementary::powi(scale, 5)),
         })
     }
 

@@ -1,6 +1,7 @@
 //! Keyframes in time: poses of kinematic bodies, targets of motors and wrenches.
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 
 use crate::joint::rotation_between;
@@ -263,7 +264,7 @@ impl Script {
             };
             let rotation = match given {
                 (Some(rotation), _) => rotation,
-                (None, Some(turn)) => (DQuat::from_scaled_axis(turn) * last.rotation).normalize(),
+                (None, Some(turn)) => (elementary::from_scaled_axis(turn) * last.rotation).normalize(),
                 (None, None) => last.rotation,
             };
             let pose = Pose::new(translation, rotation).map_err(|e| at(e.to_string()))?;
@@ -327,7 +328,7 @@ pub(crate) fn joint_named(system: &System, name: &str) -> Result<usize, String> 
 
 /// The pose at the share `s` of the way.
 fn between(a: Waypoint, b: Waypoint, s: f64) -> Waypoint {
-    let turn = DQuat::from_scaled_axis(s * b.turn);
+    let turn = elementary::from_scaled_axis(s * b.turn);
     let rotation = (turn * a.pose.rotation).normalize();
     Waypoint {
         pose: Pose { translation: a.pose.translation.lerp(b.pose.translation, s), rotation },

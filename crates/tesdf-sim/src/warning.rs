@@ -1,5 +1,6 @@
 //! What a run did not do as its scene asks: warnings for users.
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::collide::{CollideError, InstancePair, PenetrationOptions, deepest_penetration, instance_pairs};
 
 use crate::criterion::JointDrift;
@@ -120,7 +121,7 @@ impl Watch {
         });
         let (mass, size) =
             masses.fold((0.0, f64::INFINITY), |(m, least), (mass, size)| (m + mass, size.min(least)));
-        let visible = 0.5 * mass * (VISIBLE * size / scene.time_step).powi(2);
+        let visible = 0.5 * mass * elementary::powi(VISIBLE * size / scene.time_step, 2);
         Self {
             deep: scene.detector.mode.map(|_| scene.solver.deep),
             joints: vec![Apart::default(); system.joints().len()],

@@ -1,6 +1,7 @@
 //! Random points that are the same on every machine and for any number of threads.
 use glam::DVec3;
 
+use crate::base::elementary;
 use crate::geometry::Aabb;
 
 /// Random number generator of one sample. Its numbers depend on the seed and the index of the
@@ -38,7 +39,7 @@ impl Random {
 
     /// Between `low` and `high`, uniform in the logarithm.
     pub(crate) fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
+        elementary::exp(self.between(elementary::ln(low), elementary::ln(high)))
     }
 
     /// -1 or 1.
@@ -60,7 +61,7 @@ impl Random {
     /// Uniform on the unit sphere.
     pub(crate) fn direction(&mut self) -> DVec3 {
         let z = self.between(-1.0, 1.0);
-        let (sin, cos) = self.between(0.0, std::f64::consts::TAU).sin_cos();
+        let (sin, cos) = elementary::sin_cos(self.between(0.0, std::f64::consts::TAU));
         let r = (1.0 - z * z).sqrt();
         DVec3::new(r * cos, r * sin, z)
     }
@@ -68,7 +69,7 @@ impl Random {
     /// Barycentric weights of a point that is uniform in a simplex of `N` corners. Their sum is 1.
     pub(crate) fn weights<const N: usize>(&mut self) -> [f64; N] {
         // Normalised gaps of a Poisson process are uniform on the simplex.
-        let gaps: [f64; N] = std::array::from_fn(|_| -(1.0 - self.unit()).ln());
+        let gaps: [f64; N] = std::array::from_fn(|_| -elementary::ln(1.0 - self.unit()));
         let sum: f64 = gaps.iter().sum();
         if sum > 0.0 { gaps.map(|g| g / sum) } else { [1.0 / N as f64; N] }
     }

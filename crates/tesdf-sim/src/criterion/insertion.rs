@@ -1,5 +1,6 @@
 //! A body slides into another body and seats on its floor.
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
@@ -207,7 +208,7 @@ impl Tracker for InsertionTracker {
         found.farthest = found.farthest.max(found.travel);
         found.offset = found.offset.max(moved.reject_from_normalized(self.axis).length());
         // The arc sine keeps small angles, which the arc cosine rounds away.
-        let sine = turned.cross(self.axis).length().min(1.0).asin();
+        let sine = elementary::asin(turned.cross(self.axis).length().min(1.0));
         let tilt = if turned.dot(self.axis) < 0.0 { std::f64::consts::PI - sine } else { sine };
         found.tilt = found.tilt.max(tilt);
         found.energy_gain = found.energy_gain.max(kinetic + system.potential_energy() - self.energy);

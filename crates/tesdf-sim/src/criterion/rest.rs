@@ -1,5 +1,6 @@
 //! Bodies stay where they are.
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::collide::{CollideError, Pose};
 
 use super::{Criterion, Report, Rows, Tracker};
@@ -115,7 +116,8 @@ impl Tracker for RestTracker {
             let (from, to) = (poses[k], system.states()[k].pose);
             let way = to.to_world(mass.center).distance(from.to_world(mass.center));
             // The arc sine keeps small angles, which the arc cosine rounds away.
-            let turn = (to.rotation * from.rotation.inverse()).xyz().length().min(1.0).asin() * 2.0;
+            let turn =
+                elementary::asin((to.rotation * from.rotation.inverse()).xyz().length().min(1.0)) * 2.0;
             let drift = way + turn * self.sizes[k];
             if drift > self.drift || self.body.is_empty() {
                 (self.drift, self.body) = (drift, body.name.clone());

@@ -2,6 +2,7 @@
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 use tesdf::glam::DVec3;
 
@@ -97,7 +98,7 @@ impl ScrewCriterion {
 /// m, and `pitch` the pitch p, m. The result is `along` / (1 + (k / (p / 2π))²): the rest of the
 /// work turns the body.
 pub fn screw_acceleration(along: f64, gyration: f64, pitch: f64) -> f64 {
-    along / (1.0 + (gyration * TAU / pitch).powi(2))
+    along / (1.0 + elementary::powi(gyration * TAU / pitch, 2))
 }
 
 /// Records the travel and the turns of one body during a run.
@@ -162,7 +163,7 @@ impl ScrewTracker {
         let n = velocities.len() as f64;
         let mean = |f: &dyn Fn(&(f64, f64)) -> f64| velocities.iter().map(f).sum::<f64>() / n;
         let (t, v) = (mean(&|p| p.0), mean(&|p| p.1));
-        mean(&|p| (p.0 - t) * (p.1 - v)) / mean(&|p| (p.0 - t).powi(2))
+        mean(&|p| (p.0 - t) * (p.1 - v)) / mean(&|p| elementary::powi(p.0 - t, 2))
     }
 }
 
@@ -171,7 +172,7 @@ impl Tracker for ScrewTracker {
 
     fn observe(&mut self, system: &System, time_step: f64) {
         let pose = system.states()[self.body].pose;
-        let turn = (pose.rotation * self.last.rotation.inverse()).to_scaled_axis().dot(self.axis);
+        let turn = elementary::to_scaled_axis(pose.rotation * self.last.rotation.inverse()).dot(self.axis);
         self.turns += turn / TAU;
         let moved = pose.to_world(self.mass.center) - self.last.to_world(self.mass.center);
         let travel = self.travel() + moved.dot(self.axis);

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use tesdf::TeSdf;
+use tesdf::base::elementary;
 use tesdf::collide::Shape;
 
 use super::integral::Integral;
@@ -68,7 +69,7 @@ impl Solid<'_> {
             let across = at.gradient.abs().element_sum().max(1.0) * edge;
             (0.5 - at.signed_distance / across).clamp(0.0, 1.0)
         };
-        let volume = share * edge.powi(3);
+        let volume = share * elementary::powi(edge, 3);
         let own = DMat3::from_diagonal(DVec3::splat(volume * edge * edge / 12.0));
         Integral::of_part(volume, center - self.middle, own)
     }

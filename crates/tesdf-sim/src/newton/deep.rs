@@ -17,6 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use tesdf::TeSdf;
+use tesdf::base::elementary;
 use tesdf::collide::{Contact, InstanceId, Mode, Pose, Scene, Shape, ShapeId};
 
 /// cos θ of the filter: the normal of the contact is at least this much against that of the vertex
@@ -262,7 +263,7 @@ fn normals_of_vertices(asset: &TeSdf) -> Vec<DVec3> {
             }
             let [p, q, r] = [0, 1, 2].map(|j| corners[(k + j) % 3]);
             let normal = (q - p).cross(r - p);
-            let angle = normal.length().atan2((q - p).dot(r - p));
+            let angle = elementary::atan2(normal.length(), (q - p).dot(r - p));
             normals[vertex] += angle * normal.normalize_or_zero();
         }
     }

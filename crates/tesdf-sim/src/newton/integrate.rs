@@ -1,6 +1,7 @@
 //! The motion of one body: what acts on it from outside, and its pose after moving at a velocity.
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use nalgebra::Vector6;
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 
 use crate::{MassProperties, State, Wrench};
@@ -44,13 +45,15 @@ pub fn free_linear(mass: &MassProperties, state: &State, outside: &Outside, h: f
 pub fn moved(center: DVec3, pose: Pose, v: &Vector6<f64>, h: f64) -> Pose {
     let (linear, angular) = unpack(v);
     let moved = pose.to_world(center) + h * linear;
-    let rotation = (DQuat::from_scaled_axis(h * angular) * pose.rotation).normalize();
+    let rotation = (elementary::from_scaled_axis(h * angular) * pose.rotation).normalize();
     Pose { translation: moved - rotation * center, rotation }
 }
 
 #[cfg(test)]
 mod tests {
     use glam::DMat3;
+
+    use glam::DQuat;
 
     use super::*;
 

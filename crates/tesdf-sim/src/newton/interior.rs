@@ -31,6 +31,7 @@ mod sum;
 use anderson::Anderson;
 use iteration::Iterate;
 use nalgebra::Vector6;
+use tesdf::base::elementary;
 
 use super::lanes::Lanes;
 use super::line::{Bodies, Bundle, Forces, Lines, Slips};
@@ -278,7 +279,7 @@ impl Interior<'_> {
             let (excess, all) = &mut laws[usize::from(slip.torsion.is_some())];
             for lane in 0..bundle.rows().len() {
                 let [due, limit, scale] = [due, limit, &slip.scale].map(|lanes| lanes.0[lane]);
-                let size = forces.friction[0].0[lane].hypot(forces.friction[1].0[lane]);
+                let size = elementary::hypot(forces.friction[0].0[lane], forces.friction[1].0[lane]);
                 let slides = size > 0.999 * limit;
                 *excess += scale * if slides { (due - limit).abs() } else { (size - due).max(0.0) };
                 *all += scale * due;
@@ -290,8 +291,9 @@ impl Interior<'_> {
     /// The mean square of a gap of `gap` metres over all bounds, in the units of the rows.
     fn mean_square(&self, gap: f64) -> f64 {
         let square = |bundle: &Bundle| {
-            let of_row =
-                |lane: usize| bundle.count_bounds(lane) as f64 * (gap * bundle.scale.0[lane]).powi(2);
+            let of_row = |lane: usize| {
+                bundle.count_bounds(lane) as f64 * elementary::powi(gap * bundle.scale.0[lane], 2)
+            };
             (0..bundle.rows().len()).map(of_row).sum::<f64>()
         };
         self.lines.bundles.iter().map(square).sum::<f64>() / self.count_bounds().max(1) as f64

@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 use tesdf::Length;
+use tesdf::base::elementary;
 use tesdf::collide::{
     ClearanceOptions, InstanceId, InstancePair, Motion, TimeOfImpactOptions, Velocity, clearance,
     instance_pairs, time_of_impact,
@@ -144,7 +145,7 @@ impl Newton {
         // Instances look ahead with straight ways of their origins, but centres of mass move
         // straight.
         let bend = |(body, state): (&Body, &State)| match body.mass {
-            Mass::Free(mass) => (step.h * state.angular.length()).powi(2) * mass.center.length(),
+            Mass::Free(mass) => elementary::powi(step.h * state.angular.length(), 2) * mass.center.length(),
             Mass::Fixed | Mass::Kinematic => 0.0,
         };
         let bend = self.system.bodies().iter().zip(states).map(bend).fold(0.0, f64::max);

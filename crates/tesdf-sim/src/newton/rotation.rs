@@ -9,6 +9,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DQuat, DVec3};
+use tesdf::base::elementary;
 
 use super::integrate::Outside;
 use crate::{MassProperties, State};
@@ -57,7 +58,7 @@ impl Rotation {
         let mut rotation = self.start;
         for _ in 0..substeps as u32 {
             rate = self.midpoint(rotation.inverse() * momentum, rate, h);
-            rotation = (rotation * DQuat::from_scaled_axis(h * rate)).normalize();
+            rotation = (rotation * elementary::from_scaled_axis(h * rate)).normalize();
         }
         match substeps > 1.0 {
             true => logarithm(rotation * self.start.inverse(), self.h * (rotation * rate)) / self.h,
@@ -77,7 +78,7 @@ impl Rotation {
     }
 
     fn after(&self, time: f64, mean: DVec3) -> DQuat {
-        (DQuat::from_scaled_axis(time * mean) * self.start).normalize()
+        (elementary::from_scaled_axis(time * mean) * self.start).normalize()
     }
 
     /// The angular velocity in the body's frame.
@@ -90,7 +91,7 @@ impl Rotation {
     /// `rate`.
     fn midpoint(&self, momentum: DVec3, mut rate: DVec3, h: f64) -> DVec3 {
         for _ in 0..ITERATIONS {
-            let middle = DQuat::from_scaled_axis(-0.5 * h * rate) * momentum;
+            let middle = elementary::from_scaled_axis(-0.5 * h * rate) * momentum;
             let jacobian = self.inertia - 0.5 * h * cross_matrix(middle);
             let change = jacobian.inverse() * (self.inertia * rate - middle);
             if !change.is_finite() {
@@ -113,7 +114,7 @@ fn logarithm(rotation: DQuat, expected: DVec3) -> DVec3 {
         return expected;
     }
     let axis = way / size;
-    let angle = 2.0 * size.atan2(w);
+    let angle = 2.0 * elementary::atan2(size, w);
     angle * axis + ((expected.dot(axis) - angle) / TAU).round() * TAU * axis
 }
 

@@ -1,4 +1,5 @@
 //! Where the links of a robot are, by the coordinates of its joints.
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 
@@ -193,7 +194,7 @@ impl Joint {
         match self.slides {
             true => Pose { translation: x * self.axis, rotation: DQuat::IDENTITY },
             false => {
-                let rotation = DQuat::from_axis_angle(self.axis, x);
+                let rotation = elementary::from_axis_angle(self.axis, x);
                 Pose { translation: self.anchor - rotation * self.anchor, rotation }
             }
         }

@@ -10,6 +10,7 @@ use mjcf_rs::Model;
 use mjcf_rs::body::{Body, Geom, GeomType, InertiaSpec, Joint, JointType};
 use mjcf_rs::compiler::InertiaFromGeom;
 use mjcf_rs::equality::{Equality, EqualityJoint};
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 
 use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint, Unread};
@@ -340,8 +341,10 @@ impl File<'_> {
             let (from, to) = (DVec3::new(ax, ay, az), DVec3::new(bx, by, bz));
             let along = (to - from).try_normalize().ok_or_else(|| at("the ends of fromto are one point"))?;
             half_height = 0.5 * from.distance(to);
-            own =
-                Pose { translation: 0.5 * (from + to), rotation: DQuat::from_rotation_arc(DVec3::Z, along) };
+            own = Pose {
+                translation: 0.5 * (from + to),
+                rotation: elementary::from_rotation_arc(DVec3::Z, along),
+            };
         }
         let geometry = match geom.type_ {
             GeomType::Box => Geometry::Box { half_extents: DVec3::new(x, y, z) },

@@ -5,8 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use roxmltree::{Document, Node};
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 
 use super::description::{Base, Collision, Geometry, Link, Motion, Robot, RobotCoupling, RobotJoint};
@@ -111,8 +112,8 @@ impl<'a> File<'a> {
         let Some(origin) = child(node, "origin") else { return Ok(Pose::IDENTITY) };
         let translation = DVec3::from_array(self.numbers(origin, "xyz")?.unwrap_or_default());
         let [roll, pitch, yaw] = self.numbers(origin, "rpy")?.unwrap_or_default();
-        let [x, y, z] =
-            [DQuat::from_rotation_x(roll), DQuat::from_rotation_y(pitch), DQuat::from_rotation_z(yaw)];
+        let [x, y, z] = [(DVec3::X, roll), (DVec3::Y, pitch), (DVec3::Z, yaw)]
+            .map(|(axis, angle)| elementary::from_axis_angle(axis, angle));
         Ok(Pose { translation, rotation: (z * y * x).normalize() })
     }
 

@@ -1,6 +1,7 @@
 //! Friction of pairs, joints, their couplings and scripts of a scene.
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
-use tesdf::glam::{DQuat, DVec3};
+use tesdf::glam::DVec3;
 
 use super::read::LoadedScene;
 use super::{CouplingSection, JointSection, SceneError};
@@ -61,7 +62,8 @@ fn joint(system: &System, section: &JointSection) -> Result<Joint, String> {
     let axis =
         axis.ok_or_else(|| format!("axis {:?}; expected a direction of any length except 0", section.axis))?;
     let anchor = section.anchor.map_or(pose(child).translation, DVec3::from_array);
-    let frame = Pose::new(anchor, DQuat::from_rotation_arc(DVec3::Z, axis)).map_err(|e| e.to_string())?;
+    let frame =
+        Pose::new(anchor, elementary::from_rotation_arc(DVec3::Z, axis)).map_err(|e| e.to_string())?;
     let poses = [parent.map_or(Pose::IDENTITY, pose), pose(child)];
     let mut joint = Joint::new(&section.name, section.kind, (parent, child), poses, frame);
     joint.begin_at(section.coordinate)?;

@@ -3,6 +3,7 @@ use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::base::{Inside, SurfaceFaces};
 use tesdf::collide::Pose;
 use tesdf::glam::{DAffine3, DQuat, DVec3};
@@ -143,8 +144,8 @@ impl PartShape {
         let arc = |from: usize, to: usize, radius: f64, middle: f64| {
             (from..=to).map(move |k| {
                 let angle = PI * k as f64 / (AROUND / 2) as f64;
-                let r = if k == 0 || 2 * k == AROUND { 0.0 } else { radius * angle.sin() };
-                [r, middle - radius * angle.cos()]
+                let r = if k == 0 || 2 * k == AROUND { 0.0 } else { radius * elementary::sin(angle) };
+                [r, middle - radius * elementary::cos(angle)]
             })
         };
         let (quarter, half) = (AROUND / 4, AROUND / 2);
@@ -180,7 +181,7 @@ fn revolved(profile: &[[f64; 2]]) -> Result<TriangleMesh, String> {
             continue;
         }
         vertices.extend((0..AROUND).map(|k| {
-            let (sin, cos) = (TAU * k as f64 / AROUND as f64).sin_cos();
+            let (sin, cos) = elementary::sin_cos(TAU * k as f64 / AROUND as f64);
             DVec3::new(radius * cos, radius * sin, height)
         }));
         rings.push((0..AROUND as u32).map(|k| first + k).collect());

@@ -3,6 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use tesdf::base::elementary;
 use tesdf::collide::Pose;
 use tesdf::glam::{DMat3, DQuat, DVec3};
 
@@ -288,7 +289,7 @@ impl<'a> Builder<'a> {
         let motion = match joint.motion {
             Motion::Slider => Pose { translation: coordinate * axis, rotation: DQuat::IDENTITY },
             _ => {
-                let rotation = DQuat::from_axis_angle(axis, coordinate);
+                let rotation = elementary::from_axis_angle(axis, coordinate);
                 Pose { translation: joint.anchor - rotation * joint.anchor, rotation }
             }
         };

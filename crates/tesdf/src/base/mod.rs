@@ -3,6 +3,7 @@
 //! This module uses no other module.
 mod certificate;
 mod chains;
+pub mod elementary;
 mod inside;
 mod isa;
 mod length;

@@ -1,4 +1,5 @@
 //! Refines all roots within an effort, and refuses meshes for which the effort is not enough.
+use crate::base::elementary;
 use crate::parallel::*;
 
 use super::effort::Effort;
@@ -29,7 +30,7 @@ pub fn refine_within_effort(
     let faces = surface.faces.len() as u32;
     let limit = effort_per_face * (u64::from(faces) + SMALL_MESH);
     if surface.needleness() > NEEDLES {
-        refiner.weights.long_faces = (surface.needleness() / WORTH_A_BYTE).powi(2);
+        refiner.weights.long_faces = elementary::powi(surface.needleness() / WORTH_A_BYTE, 2);
     }
     for _ in 0..ATTEMPTS {
         let effort = Effort::new(limit);

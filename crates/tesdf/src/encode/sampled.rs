@@ -11,6 +11,7 @@ use super::filter::Scratch;
 use super::surface::Surface;
 use super::{Sampling, Threshold};
 use crate::base::Progress;
+use crate::base::elementary;
 use crate::domain::Cell;
 use crate::geometry::AabbTree;
 use crate::parallel::*;
@@ -90,7 +91,8 @@ impl Sampler for Processor {
 pub fn lipschitz_candidates(surface: &Surface, tree: &AabbTree, cell: &Cell) -> Vec<u32> {
     let center = cell.centroid();
     let distance = |face: u32| surface.triangles[face as usize].closest(center).distance;
-    let nearest = tree.nearest(center, |face| distance(face).powi(2)).map_or(0.0, |(d, _)| d.sqrt());
+    let nearest =
+        tree.nearest(center, |face| elementary::powi(distance(face), 2)).map_or(0.0, |(d, _)| d.sqrt());
     let limit = nearest + 2.0 * cell.radius();
     let mut faces = Vec::new();
     tree.visit(

@@ -2,6 +2,7 @@
 use super::refine::{Leaf, Tree};
 use crate::asset::about::Statistics;
 use crate::asset::layout::Label;
+use crate::base::elementary;
 use crate::domain::Cell;
 use crate::geometry::LocalFrame;
 use crate::mesh::TriangleMesh;
@@ -24,7 +25,7 @@ pub fn statistics(
     roots.iter().zip(cells).for_each(|(tree, &cell)| add(&mut s, tree, cell));
     let listed = s.domain_volume - s.far_volume;
     s.volume_weighted_list /= if listed > 0.0 { listed } else { 1.0 };
-    let unit = frame.scale.powi(-3);
+    let unit = elementary::powi(frame.scale, -3);
     s.domain_volume *= unit;
     s.far_volume *= unit;
     s

@@ -5,6 +5,7 @@ use std::cmp::Reverse;
 use std::collections::HashMap;
 
 use crate::base::Isa;
+use crate::base::elementary;
 use crate::geometry::{Feature, Triangle};
 use crate::mesh::TriangleMesh;
 
@@ -144,7 +145,7 @@ impl Surface {
     pub(crate) fn most_slender(&self) -> (u32, f64) {
         let slenderness = |face: usize| {
             let [a, b, c] = self.triangles[face].corners;
-            self.longest[face].powi(2) / (b - a).cross(c - a).length()
+            elementary::powi(self.longest[face], 2) / (b - a).cross(c - a).length()
         };
         let faces = (0..self.faces.len()).map(|face| (face as u32, slenderness(face)));
         faces.fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })

@@ -1,6 +1,7 @@
 use glam::DVec3;
 
 use super::Aabb;
+use crate::base::elementary;
 
 /// The frame of all computations: `local = (x − offset) · scale`, exact for every vertex.
 ///
@@ -29,7 +30,7 @@ impl LocalFrame {
         };
         let offset = DVec3::from_array(std::array::from_fn(|a| axis(bounds.min[a], bounds.max[a])));
         let (_, exponent) = frexp(bounds.extent().length());
-        Self::new(offset, 2f64.powi(-exponent))
+        Self::new(offset, elementary::powi(2.0, -exponent))
     }
 
     /// A frame with the given offset and scale, as stored in an asset.
@@ -56,7 +57,7 @@ impl LocalFrame {
 /// Splits `x` into `m · 2^e` with `m` in [0.5, 1). `x` must be finite, positive and normal.
 fn frexp(x: f64) -> (f64, i32) {
     let e = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1022;
-    (x / 2f64.powi(e), e)
+    (x / elementary::powi(2.0, e), e)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::{Aabb, WindingNumber, perturbed_orientation, signed_crossing};
+use crate::base::elementary;
 
 /// The generalised winding number (Jacobson et al. 2013) of any triangles: the sum of their solid
 /// angles divided by 4 pi.
@@ -194,7 +195,7 @@ impl GeneralizedWinding {
             // Points of the edge at the way s from the nearest one are at least √(s² + apart²)
             // away.
             let of_edge = (along.length() / apart).min(2.0) / (apart * apart);
-            bend += times * of_edge / (1.0 - radius / apart).powi(3);
+            bend += times * of_edge / elementary::powi(1.0 - radius / apart, 3);
         }
         let error = 1.000_001 * radius * radius * bend / (4.0 * PI) + error + DECIDED;
         let is_known = error.is_finite() && gradient.is_finite();
@@ -260,11 +261,11 @@ fn solid_angle(triangle: [DVec3; 3], x: DVec3) -> (f64, f64) {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let sine = a.dot(b.cross(c)).abs();
     let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    let condition = sine.hypot(cosine) / (la * lb * lc);
+    let condition = elementary::hypot(sine, cosine) / (la * lb * lc);
     if condition.is_nan() {
         return (0.0, 0.0);
     }
-    (f64::from(side) * 2.0 * sine.atan2(cosine), condition.min(1.0))
+    (f64::from(side) * 2.0 * elementary::atan2(sine, cosine), condition.min(1.0))
 }
 
 /// A point moved towards the bounds, so that it stays within them.

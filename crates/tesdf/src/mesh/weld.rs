@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use glam::{DVec3, I64Vec3};
 
 use super::topology::{Topology, has_repeated_corner};
+use crate::base::elementary;
 
 /// The distinct positions of the used vertices, and the position of each vertex.
 pub(super) struct Welded {
@@ -84,7 +85,7 @@ pub(super) fn weld_within(positions: &[DVec3], tolerance: f64) -> Vec<u32> {
     let largest = largest_coordinate(positions);
     // Most points are near no side of their cell, so few cells are looked at. A cell may be larger,
     // so that cell indices fit into 64 bits.
-    let cell = (2.0 * tolerance).max(largest * 2f64.powi(-40));
+    let cell = (2.0 * tolerance).max(largest * elementary::powi(2.0, -40));
     let key = |p: DVec3| (p / cell).floor().as_i64vec3();
     // Rounding does not move a point that is within the tolerance out of reach.
     let reach = DVec3::splat(tolerance * (1.0 + 1e-12) + largest * 4.0 * f64::EPSILON);

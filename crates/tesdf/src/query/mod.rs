@@ -91,6 +91,7 @@ pub(crate) use surroundings::Surroundings;
 
 use crate::TeSdf;
 use crate::base::Side;
+use crate::base::elementary;
 use crate::geometry::{Closest, Feature};
 use far_points::is_near;
 pub(crate) use sign::Facing;
@@ -575,7 +576,7 @@ impl TeSdf {
             let weight = match (held, ids.iter().position(|v| *v == held[0])) {
                 ([_], Some(k)) => {
                     let at = |i: usize| triangle.corners[(k + i) % 3] - triangle.corners[k];
-                    at(1).angle_between(at(2))
+                    elementary::angle_between(at(1), at(2))
                 }
                 _ => 1.0,
             };

@@ -341,7 +341,8 @@ fn squared_box_bound(p: Vec3) -> impl Fn(&[f32]) -> f32 {
 
 /// The squared distance in `f32` up to which a face can be within `distance`.
 fn squared_limit(distance: f32) -> f32 {
-    (distance * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2)
+    let limit = distance * (1.0 + F32_RELATIVE) + F32_ABSOLUTE;
+    limit * limit
 }
 
 struct Best {

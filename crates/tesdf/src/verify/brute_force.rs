@@ -1,5 +1,6 @@
 use glam::DVec3;
 
+use crate::base::elementary;
 use crate::mesh::TriangleMesh;
 
 /// Distance to all faces of a mesh, one after the other. A face is skipped when a ball around it is
@@ -44,7 +45,7 @@ struct Facet {
 impl BruteForce {
     /// `diagonal` is the mesh's diagonal; it must be finite and positive.
     pub(crate) fn new(mesh: &TriangleMesh, diagonal: f64) -> Self {
-        let scale = (-diagonal.log2().floor()).clamp(-1000.0, 1000.0).exp2();
+        let scale = elementary::exp2((-elementary::log2(diagonal).floor()).clamp(-1000.0, 1000.0));
         let facets = (0..mesh.faces().len()).map(|f| Facet::new(mesh.triangle(f).map(|p| p * scale)));
         let facets: Vec<Facet> = facets.collect();
         Self { balls: facets.iter().map(Facet::ball).collect(), facets, scale }

@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use crate::TeSdf;
 use crate::base::InsideRule;
+use crate::base::elementary;
 use crate::geometry::perturbed_orientation;
 use crate::mesh::{TriangleMesh, WindingNumber};
 use crate::query::Answer;
@@ -59,7 +60,7 @@ fn generalized(mesh: &TriangleMesh, p: DVec3) -> f64 {
         let [a, b, c] = mesh.triangle(f).map(|v| (v - p) * scale);
         let (la, lb, lc) = (a.length(), b.length(), c.length());
         let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        2.0 * side * a.dot(b.cross(c)).abs().atan2(cosine)
+        2.0 * side * elementary::atan2(a.dot(b.cross(c)).abs(), cosine)
     };
     (0..mesh.faces().len()).map(angle).sum::<f64>() / (4.0 * PI)
 }

@@ -192,6 +192,78 @@ fn no_files_use_each_other_in_a_cycle() {
     assert!(circles.is_empty(), "{circles:?}");
 }
 
+/// Functions of the standard library and of glam whose last bits depend on the platform.
+const OF_PLATFORM: [&str; 37] = [
+    "acos",
+    "acosh",
+    "angle_between",
+    "asin",
+    "asinh",
+    "atan",
+    "atan2",
+    "atanh",
+    "cbrt",
+    "cos",
+    "cosh",
+    "exp",
+    "exp2",
+    "exp_m1",
+    "from_axis_angle",
+    "from_euler",
+    "from_rotation_arc",
+    "from_rotation_x",
+    "from_rotation_y",
+    "from_rotation_z",
+    "from_scaled_axis",
+    "hypot",
+    "ln",
+    "ln_1p",
+    "log",
+    "log10",
+    "log2",
+    "powf",
+    "powi",
+    "sin",
+    "sin_cos",
+    "sinh",
+    "slerp",
+    "tan",
+    "tanh",
+    "to_axis_angle",
+    "to_scaled_axis",
+];
+
+/// What reaches the bytes of assets, contacts and runs has the same bits on every platform.
+#[test]
+fn elementary_functions_are_those_of_the_library() {
+    let mut uses = 0;
+    for krate in ["tesdf", "tesdf-parts", "tesdf-sim"] {
+        let source = Source::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(krate));
+        let is_for_tests = |name: &String| name == FOR_TESTS || name == "random_tetrahedra";
+        for (module, code) in source.files.iter().filter(|(module, _)| !module.iter().any(is_for_tests)) {
+            if module.ends_with(&["elementary".to_owned()]) {
+                continue;
+            }
+            uses += code.matches("elementary::").count();
+            let code = code.replace("elementary::", "");
+            for name in OF_PLATFORM {
+                for call in [format!(".{name}("), format!("::{name}")] {
+                    let found = code.match_indices(&call).find(|(at, _)| {
+                        !code[at + call.len()..].starts_with(|c: char| c.is_alphanumeric() || c == '_')
+                    });
+                    assert_eq!(
+                        found,
+                        None,
+                        "{krate}: {} has {call}; use base::elementary",
+                        module.join("::")
+                    );
+                }
+            }
+        }
+    }
+    assert!(uses > 90, "{uses} uses were found");
+}
+
 /// Folders of kernels have the names of folders of the library. A file that has the name of one there
 /// mirrors it, and says so at its head.
 #[test]

@@ -1,5 +1,6 @@
 //! An iterate of the interior point method, and the iterations to the solution.
 use nalgebra::Vector6;
+use tesdf::base::elementary;
 
 use super::state::{State, bounded};
 use super::sum::Sum;
@@ -141,7 +142,8 @@ impl<'a> Iterate<'a> {
 
     /// From the velocities that the springs of all rows would lead to.
     pub fn cold(of: &'a Interior<'a>) -> Self {
-        let centre = f64::max((FIRST * of.greatest_violation()).powi(2), of.mean_square(LEAST_GAP));
+        let centre =
+            f64::max(elementary::powi(FIRST * of.greatest_violation(), 2), of.mean_square(LEAST_GAP));
         let none = vec![Forces::default(); of.lines.bundles.len()];
         let mut matrix = BlockMatrix::symmetric(of.pattern, of.bodies.inertia.to_vec());
         let mut momentum: Vec<_> =
@@ -347,7 +349,7 @@ impl<'a> Iterate<'a> {
         }
         let affine = predictor.longest.min(1.0);
         let product = self.product();
-        let centring = (1.0 - affine).powi(3).max(LEAST_CENTRING);
+        let centring = elementary::powi(1.0 - affine, 3).max(LEAST_CENTRING);
         let centre = (centring * product).max(self.least).min(product.max(self.least));
         for ((aims, change), state) in self.aims.iter_mut().zip(&predictor.rows).zip(&self.states) {
             // They were the products, away from zero.

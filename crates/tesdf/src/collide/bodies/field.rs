@@ -6,6 +6,7 @@ use glam::DVec3;
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
+use crate::base::elementary;
 use crate::collide::report::contact::FeatureB;
 use crate::collide::scene::field_value::FieldValue;
 use crate::collide::scene::pose::{Placement, Pose};
@@ -227,7 +228,7 @@ impl<'a> FieldBody<'a> {
         if let Field::Mesh(asset) = self.field {
             let far = limit.max(0.0) + ROUNDING;
             let far = self.jump().map_or(far, |jump| far.max(radius + jump.reach_beyond()));
-            if asset.local_bounds().distance_squared(p) > far.powi(2) {
+            if asset.local_bounds().distance_squared(p) > elementary::powi(far, 2) {
                 return None;
             }
         }

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
+use crate::base::elementary;
 use crate::collide::bodies::branch::Branch;
 use crate::collide::bodies::field::{Field, FieldBody};
 use crate::collide::bodies::reach::Reach;
@@ -518,7 +519,7 @@ impl FieldBody<'_> {
                 return (DVec3::ZERO, half_height + radius);
             }
             Field::Simple(Simple::Cylinder(Cylinder { half_height, radius })) => {
-                return (DVec3::ZERO, half_height.hypot(radius));
+                return (DVec3::ZERO, elementary::hypot(half_height, radius));
             }
             Field::Simple(Simple::Plane) => return (DVec3::ZERO, f64::INFINITY),
         };

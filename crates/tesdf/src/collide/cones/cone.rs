@@ -2,6 +2,8 @@
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
+use crate::base::elementary;
+
 /// Sine of the angle by which a normal may be out of a cone: bodies that turn by less in a step can
 /// touch there.
 pub const SLOPE: f64 = 0.1;
@@ -116,7 +118,7 @@ impl Cone {
         let mut pairs = (0..self.rays.len()).flat_map(|i| (i + 1..self.rays.len()).map(move |j| (i, j)));
         let is_beside = |(i, j)| {
             let across = self.cross(i, j);
-            v.dot(across).powi(2) <= sine_squared * across.length_squared()
+            elementary::powi(v.dot(across), 2) <= sine_squared * across.length_squared()
                 && self.foot(i, j, v).is_some_and(|foot| foot.dot(v) >= least)
         };
         pairs.any(is_beside) || self.is_inside(v)
@@ -157,7 +159,7 @@ pub fn crossing([a, b]: [&DVec3; 2], [c, d]: [&DVec3; 2]) -> Option<DVec3> {
 
 /// The extreme rays of what two cones have in common.
 pub fn common(one: &Cone, other: &Cone) -> ArrayVec<DVec3, { 4 * MOST }> {
-    let least = NEAR.cos();
+    let least = elementary::cos(NEAR);
     let holds = |cone: &Cone, ray: DVec3| cone.is_within(ray, least);
     let mut rays = ArrayVec::<DVec3, { 4 * MOST }>::new();
     // There are at most as many as both have together, and some that rounding adds.

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::Lowest;
 use crate::TeSdf;
+use crate::base::elementary;
 use crate::collide::bodies::field::{CellField, ROUNDING};
 use crate::collide::bodies::polygon::{MAX_VERTICES, Polygon};
 use crate::collide::scene::field_value::FieldValue;
@@ -196,7 +197,7 @@ impl<'a> Branches<'a> {
         };
         let points = piece.corners.map(|c| c.point);
         let longest = (0..3).map(|i| points[i].distance_squared(points[(i + 1) % 3])).fold(0.0, f64::max);
-        if (SHALLOW * piece.center.distance).powi(2) > longest {
+        if elementary::powi(SHALLOW * piece.center.distance, 2) > longest {
             return None;
         }
         let face = asset.local_triangle(piece.center.position as usize);

@@ -14,6 +14,7 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::{Minimum, Search, cell_of};
+use crate::base::elementary;
 use crate::collide::bodies::field::CellField;
 use crate::collide::bodies::surface::{Part, PartFacing};
 use crate::collide::scene::field_value::FieldValue;
@@ -266,7 +267,9 @@ impl<'a> Patch<'a> {
         let across = self.normal.cross(along);
         // Not along an edge, where all points of the edge would be extremes.
         let angle = |k: usize| (k as f64 + 0.5) * std::f64::consts::TAU / DIRECTIONS as f64;
-        (0..DIRECTIONS).map(|k| angle(k).cos() * along + angle(k).sin() * across).collect()
+        (0..DIRECTIONS)
+            .map(|k| elementary::cos(angle(k)) * along + elementary::sin(angle(k)) * across)
+            .collect()
     }
 
     /// The contact of the candidate that is farthest along a direction among those that have one, if

@@ -2,6 +2,7 @@ use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
 
+use crate::base::elementary;
 use crate::collide::scene::Velocity;
 use crate::collide::scene::pose::Pose;
 
@@ -95,10 +96,10 @@ impl Motion {
             Self::Rest => start,
             Self::Linear { velocity } => Pose {
                 translation: start.translation + t * velocity.linear,
-                rotation: rotated(DQuat::from_scaled_axis(t * velocity.angular), start.rotation),
+                rotation: rotated(elementary::from_scaled_axis(t * velocity.angular), start.rotation),
             },
             Self::About { point, velocity } => {
-                let rotation = DQuat::from_scaled_axis(t * velocity.angular);
+                let rotation = elementary::from_scaled_axis(t * velocity.angular);
                 Pose {
                     translation: point + t * velocity.linear + rotation * (start.translation - point),
                     rotation: rotated(rotation, start.rotation),
@@ -106,7 +107,7 @@ impl Motion {
             }
             Self::Screw { point, axis, angular_speed, pitch } => {
                 let (axis, angle) = (axis.normalize_or_zero(), t * angular_speed);
-                let rotation = DQuat::from_axis_angle(axis, angle);
+                let rotation = elementary::from_axis_angle(axis, angle);
                 Pose {
                     translation: point
                         + rotation * (start.translation - point)

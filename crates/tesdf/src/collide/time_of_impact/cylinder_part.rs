@@ -3,6 +3,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
+use crate::base::elementary;
 use crate::collide::scene::cylinder::Cylinder;
 
 /// Number of sectors of a turn. A side of the prism is one or more of them.
@@ -114,7 +115,7 @@ impl CylinderPart {
         let middle = direction(f64::from(self.first) + 0.5 * f64::from(self.count));
         let half_angle = PI * f64::from(self.count) / f64::from(SECTORS);
         // The part reaches from `near` to the radius along the middle direction, and `aside`.
-        let (near, aside) = (half_angle.cos(), half_angle.min(0.5 * PI).sin());
+        let (near, aside) = (elementary::cos(half_angle), elementary::sin(half_angle.min(0.5 * PI)));
         let (low, high) = match self.kind {
             Kind::Round { .. } => (-h, h),
             Kind::Segment { is_high: false } | Kind::Triangle { is_high: false } => (-h, -h),

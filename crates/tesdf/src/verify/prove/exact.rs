@@ -2,6 +2,8 @@
 //! normals of needles.
 use glam::DVec3;
 
+use crate::base::elementary;
+
 /// Largest relative error of one rounded operation.
 pub const U: f64 = f64::EPSILON / 2.0;
 
@@ -54,7 +56,7 @@ pub fn unit_normal([a, b, c]: [DVec3; 3]) -> Option<(DVec3, f64)> {
     let largest = normal.abs().max_element();
     // A smaller product may have lost digits to underflow. Such triangles are below 2^-200 in
     // height or length.
-    if largest.is_nan() || largest <= 2f64.powi(-400) {
+    if largest.is_nan() || largest <= elementary::powi(2.0, -400) {
         return None;
     }
     let scaled = normal / largest;

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use crate::base::elementary;
 use crate::collide::report::contact::Contact;
 use crate::collide::scene::ids::InstanceId;
 
@@ -18,7 +19,7 @@ pub fn groups(
     link: f64,
     angle: f64,
 ) -> Vec<Vec<usize>> {
-    let least_cos = angle.cos();
+    let least_cos = elementary::cos(angle);
     let mut grid: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     let mut on_face: BTreeMap<(InstanceId, u32), Vec<usize>> = BTreeMap::new();
     for &i in members {
