@@ -21,6 +21,6 @@ if step "dependencies" "$deny" fetch db; then
 else
     echo "warning: the list of known vulnerabilities could not be fetched; dependencies are checked for licences and sources alone" >&2
 fi
-for workspace in . python fuzz lab; do
+for workspace in . python fuzz lab crates/tesdf-web; do
     step "dependencies" "$deny" --manifest-path "$workspace/Cargo.toml" --config deny.toml --locked check --hide-inclusion-graph $advisories bans licenses sources
 done

@@ -22,8 +22,8 @@
 //! - [`Worlds`]: many worlds of one scene, stepped on all threads, for control and learning.
 //! - [`record`]: run files.
 //!
-//! Units are SI: metres, kilograms, seconds, radians. Everything is deterministic: on one kind of
-//! processor, the same input gives the same bits on any number of threads.
+//! Units are SI: metres, kilograms, seconds, radians. Everything is deterministic: the same input
+//! gives the same bits on any number of threads, processor and platform.
 #![warn(missing_docs)]
 
 mod coupling;

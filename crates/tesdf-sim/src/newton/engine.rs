@@ -1,5 +1,4 @@
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use nalgebra::Vector6;
@@ -21,6 +20,7 @@ use super::rows::FreeBody;
 use super::seen::Seen;
 use super::sleep::Sleep;
 use super::step::{Step, set_velocities};
+use super::stopwatch::Stopwatch;
 use super::velocities::Solved;
 use super::{Detect, Newton, NewtonOptions};
 use crate::dynamics::Verdict;
@@ -216,7 +216,7 @@ impl Newton {
         states: &[State],
         hidden: HiddenSearch,
     ) -> Result<Contacts, DynamicsError> {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let options = CollideOptions { hidden, ..self.options_of(step.h) };
         let contacts = self.detector.detect(self.system.scene_at(states)?, &options)?;
         step.report.detections += 1;
@@ -237,7 +237,7 @@ impl Newton {
     /// The first look of a part: it looks only at pairs of which a body has moved since the last
     /// one.
     fn first_look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let options = CollideOptions { hidden: HiddenSearch::On, ..self.options_of(step.h) };
         self.system.scene_at(ahead)?;
         let contacts = match self.seen.unmoved(&self.system, &options) {
@@ -391,7 +391,7 @@ impl Newton {
 
     /// Solves a part of a step, `whole`, that takes `time_step` seconds. Nothing moves yet.
     fn part(&mut self, time_step: f64, whole: f64, bounces: &mut Bounces) -> Result<Made, DynamicsError> {
-        let begin = Instant::now();
+        let begin = Stopwatch::start();
         let mut step = self.begin(time_step, whole);
         // The detection must reach as far as the step can close, so it uses the velocities that
         // wrenches give; gravity is in the contact distance. Contacts, motors and joints change

@@ -68,6 +68,7 @@ mod sleep;
 mod snapshot;
 mod solve;
 mod step;
+mod stopwatch;
 mod velocities;
 
 pub use options::NewtonOptions;

@@ -1,3 +1,4 @@
+use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
 /// The stage of an encoding.
@@ -13,15 +14,24 @@ pub enum Stage {
 
 /// Progress, shared between the thread that works and a thread that watches. It tells how far the
 /// work is, and carries the request to stop.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Progress {
     cancel: AtomicBool,
     done: AtomicU64,
     total: AtomicU64,
     stage: AtomicU8,
+    told: Option<Told>,
 }
 
+type Told = Box<dyn Fn(&Progress) + Send + Sync>;
+
 impl Progress {
+    /// A progress that also calls a function after each small part of the work, on the thread that
+    /// did it. Where there is one thread only, as in a browser, nobody else could watch.
+    pub fn telling(told: impl Fn(&Self) + Send + Sync + 'static) -> Self {
+        Self { told: Some(Box::new(told)), ..Self::default() }
+    }
+
     /// Asks the work to stop. An encoding then returns
     /// [`EncodeError::Cancelled`](crate::encode::EncodeError::Cancelled).
     pub fn cancel(&self) {
@@ -48,9 +58,24 @@ impl Progress {
         self.done.store(0, Ordering::Relaxed);
         self.total.store(total, Ordering::Relaxed);
         self.stage.store(stage as u8, Ordering::Relaxed);
+        self.tell();
     }
 
     pub(crate) fn advance(&self, by: u64) {
         self.done.fetch_add(by, Ordering::Relaxed);
+        self.tell();
+    }
+
+    fn tell(&self) {
+        if let Some(told) = &self.told {
+            told(self);
+        }
+    }
+}
+
+impl fmt::Debug for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (stage, share) = self.state();
+        f.debug_struct("Progress").field("stage", &stage).field("share", &share).finish_non_exhaustive()
     }
 }

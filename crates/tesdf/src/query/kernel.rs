@@ -1,8 +1,7 @@
 //! Squared distances from one point to the faces of a list, several faces at once.
 //!
-//! One source is compiled per instruction set; the set is chosen when an asset is opened. With
-//! fused multiply-add the last bits differ from those without. This can only change which of two
-//! equally near faces is chosen.
+//! One source is compiled per instruction set; the set is chosen when an asset is opened. No
+//! operations are fused, so all sets give the same bits.
 
 use glam::Vec3;
 
@@ -171,8 +170,7 @@ fn apart_lanes<L: Lanes<N>, const N: usize>(
         let (u, height) = if k == 3 { (axes.normal, axes.height) } else { (axes.outward[k], axes.sides[k]) };
         let u = V([L::splat(u.x), L::splat(u.y), L::splat(u.z)]);
         let first = a.dot(u).sub(L::splat(height));
-        let (second, third) =
-            (first.mul_add(L::splat(1.0), ab.dot(u)), first.mul_add(L::splat(1.0), ac.dot(u)));
+        let (second, third) = (first.add(ab.dot(u)), first.add(ac.dot(u)));
         bound = first.min(second).min(third).max(bound);
         if k == 3 {
             bound = zero.sub(first.max(second).max(third)).max(bound);
@@ -209,10 +207,10 @@ fn boxes_apart_lanes<L: Lanes<N>, const N: usize>(boxes: &[[f32; N]; 6], axes: &
     for k in 0..3 {
         let (low, high) = (row(k), row(3 + k));
         // Halved before the sum, which then cannot overflow.
-        centers[k] = low.mul_add(half, high.mul(half));
-        halves[k] = high.mul_add(half, zero.sub(low.mul(half)));
+        centers[k] = low.mul(half).add(high.mul(half));
+        halves[k] = high.mul(half).sub(low.mul(half));
         let apart = low.sub(L::splat(axes.high[k])).max(L::splat(axes.low[k]).sub(high)).max(zero);
-        squared = apart.mul_add(apart, squared);
+        squared = apart.mul(apart).add(squared);
     }
     let mut bound = zero;
     for k in 0..4 {
@@ -290,7 +288,7 @@ fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
 fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>, at: L) -> L {
     let t = at.max(L::splat(0.0)).min(L::splat(1.0));
     let ([x, y, z], [u, v, w]) = (along.0, from.0);
-    let to = V([x.neg_mul_add(t, u), y.neg_mul_add(t, v), z.neg_mul_add(t, w)]);
+    let to = V([u.sub(x.mul(t)), v.sub(y.mul(t)), w.sub(z.mul(t))]);
     to.dot(to)
 }
 
@@ -311,7 +309,7 @@ impl<L> V<L> {
     where
         L: Lanes<N>,
     {
-        self.0[2].mul_add(o.0[2], self.0[1].mul_add(o.0[1], self.0[0].mul(o.0[0])))
+        self.0[2].mul(o.0[2]).add(self.0[1].mul(o.0[1]).add(self.0[0].mul(o.0[0])))
     }
 
     #[inline(always)]
@@ -320,7 +318,7 @@ impl<L> V<L> {
         L: Lanes<N>,
     {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
-        Self([c.neg_mul_add(y, b.mul(z)), a.neg_mul_add(z, c.mul(x)), b.neg_mul_add(x, a.mul(y))])
+        Self([b.mul(z).sub(c.mul(y)), c.mul(x).sub(a.mul(z)), a.mul(y).sub(b.mul(x))])
     }
 }
 

@@ -1,4 +1,6 @@
 //! Several `f32` at once, with the operations that the distance kernel needs.
+//!
+//! No operations are fused: which faces are nearest, and so contacts, would depend on the processor.
 
 /// `N` numbers.
 pub trait Lanes<const N: usize>: Copy {
@@ -12,10 +14,8 @@ pub trait Lanes<const N: usize>: Copy {
     fn sub(self, o: Self) -> Self;
     /// Product.
     fn mul(self, o: Self) -> Self;
-    /// `self · o + plus`, rounded once where the instruction set allows.
-    fn mul_add(self, o: Self, plus: Self) -> Self;
-    /// `plus − self · o`, rounded once where the instruction set allows.
-    fn neg_mul_add(self, o: Self, plus: Self) -> Self;
+    /// Sum.
+    fn add(self, o: Self) -> Self;
     /// The smaller number; `o` where either is NaN.
     fn min(self, o: Self) -> Self;
     /// The larger number; `o` where either is NaN.
@@ -60,12 +60,8 @@ impl Lanes<8> for [f32; 8] {
         std::array::from_fn(|l| self[l] * o[l])
     }
     #[inline(always)]
-    fn mul_add(self, o: Self, plus: Self) -> Self {
-        std::array::from_fn(|l| self[l] * o[l] + plus[l])
-    }
-    #[inline(always)]
-    fn neg_mul_add(self, o: Self, plus: Self) -> Self {
-        std::array::from_fn(|l| plus[l] - self[l] * o[l])
+    fn add(self, o: Self) -> Self {
+        std::array::from_fn(|l| self[l] + o[l])
     }
     #[inline(always)]
     fn min(self, o: Self) -> Self {
@@ -170,12 +166,8 @@ mod avx2 {
             unsafe { _mm256_mul_ps(self, o) }
         }
         #[inline(always)]
-        fn mul_add(self, o: Self, plus: Self) -> Self {
-            unsafe { _mm256_fmadd_ps(self, o, plus) }
-        }
-        #[inline(always)]
-        fn neg_mul_add(self, o: Self, plus: Self) -> Self {
-            unsafe { _mm256_fnmadd_ps(self, o, plus) }
+        fn add(self, o: Self) -> Self {
+            unsafe { _mm256_add_ps(self, o) }
         }
         #[inline(always)]
         fn min(self, o: Self) -> Self {

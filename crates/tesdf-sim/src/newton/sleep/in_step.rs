@@ -1,10 +1,10 @@
 //! Which bodies of a step are asleep, and what wakes them.
-use std::time::Instant;
 
 use tesdf::collide::{CollideOptions, Contact, Contacts, HiddenSearch, InstanceId, instance_pairs};
 
 use super::{Kept, Rest, STAYS, Sleep, is_free, joined, pairs_of, way};
 use crate::newton::islands::{join, root};
+use crate::newton::stopwatch::Stopwatch;
 use crate::newton::{Newton, NewtonOptions};
 use crate::{DynamicsError, Mass, Motor, State, StepReport, Wrench};
 
@@ -36,7 +36,7 @@ impl Newton {
         asleep.pairs.retain(|_, pair| pair.bodies.iter().all(|&body| still[body] && kept[body]));
         let new: Vec<bool> = still.iter().zip(&kept).map(|(still, kept)| *still && !kept).collect();
         if new.contains(&true) {
-            let start = Instant::now();
+            let start = Stopwatch::start();
             self.find_kept(&new, whole)?;
             report.detection += start.elapsed();
         }
