@@ -144,7 +144,7 @@ void main() {
   float line = abs(fract(d / step_ + 0.5) - 0.5) * step_;
   c *= mix(0.72, 1.0, smoothstep(0.4 * wide, 1.3 * wide, line));
   c = mix(vec3(0.08), c, smoothstep(0.6 * wide, 1.8 * wide, abs(d)));
-  float alpha = d < 0.0 ? 1.0 : 0.82;
+  float alpha = d < 0.0 ? 1.0 : 0.86 * (1.0 - smoothstep(0.06, 0.3, d));
   pixel = vec4(c * alpha, alpha);
 }`,
 ];

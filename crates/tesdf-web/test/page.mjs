@@ -59,7 +59,7 @@ try {
   const before = await clearance();
   await page.evaluate(() => {
     const slider = document.querySelector('#pose input[aria-label^="x of"]');
-    slider.value = 1.2;
+    slider.value = 0.75;
     slider.dispatchEvent(new Event("input"));
   });
   await settled(async () => (await clearance()) > before + 1e-3);
@@ -68,10 +68,7 @@ try {
   await picture("apart");
 
   // With the mouse, to the left, until it overlaps.
-  const spot = await page.evaluate(async () => {
-    const { x, y, width, height } = document.getElementById("view").getBoundingClientRect();
-    return { x, y, width, height };
-  });
+  const spot = page.viewportSize();
   const found = await page.evaluate(({ width, height }) => {
     // The rightmost place where the second body is.
     for (let x = width - 5; x > 0; x -= 8) {
