@@ -106,6 +106,7 @@ const updateSlice = latest(async () => {
   const at = [0, 1, 2].map((k) => (k === axis ? Number(byId("place").value) : -0.65) * state.size + state.middle[k]);
   const wish = { corner: at, across: side(u), down: side(v), columns: SLICE_SIDE, rows: SLICE_SIDE };
   const answer = await ask("slice", wish);
+  if (!state.loaded) return;
   view.setSlice(toView(at), side(u).map((x) => x / state.size), side(v).map((x) => x / state.size), answer, 1 / state.size);
   state.distances = answer.distances;
   draw();
@@ -124,7 +125,7 @@ const updatePair = latest(async () => {
     return;
   }
   const found = await ask("pair", { pose: pose(), near: NEAR * state.size });
-  showPair(found);
+  if (state.loaded) showPair(found);
 });
 const turned = (rows, v) => rows.map((row) => dot(row, v));
 
@@ -226,6 +227,15 @@ function makePose() {
 }
 const showPose = () => state.shownPose.forEach((shown) => shown());
 
+// Nothing is shown.
+function clear() {
+  state.loaded = false;
+  ["slice", "pair", "save"].forEach((id) => (byId(id).hidden = true));
+  view.bodies = {};
+  [view.marks, view.lines, view.slice] = [[], [], null];
+  draw();
+}
+
 function showReport(report) {
   const { faces, vertices, shells, encodable, defects } = report;
   byId("verdict").textContent = `${faces.toLocaleString("en")} faces, ${vertices.toLocaleString("en")} vertices, ${shells} ${shells === 1 ? "shell" : "shells"}. ${encodable ? "It has a well-defined inside." : "It has no well-defined inside:"}`;
@@ -283,7 +293,7 @@ function loadFile(file) {
     if (isNew) byId("repair").checked = false;
     const { report } = await ask("check", { bytes, name: file.name });
     showReport(report);
-    if (!report.encodable && !byId("repair").checked) return;
+    if (!report.encodable && !byId("repair").checked) return clear();
     const found = await ask("encodeFile", { bytes, name: file.name, repair: byId("repair").checked });
     if (found.changed) byId("verdict").textContent += " It was repaired.";
     show(found, file.name, null);
@@ -297,12 +307,8 @@ byId("repair").onchange = () => byId("repair").checked && state.file && loadFile
 byId("stop").onclick = () => {
   // A worker that computes hears nothing; a new one has no bodies.
   begin();
-  state.loaded = false;
-  ["slice", "pair", "save"].forEach((id) => (byId(id).hidden = true));
-  view.bodies = {};
-  [view.marks, view.lines, view.slice] = [[], [], null];
+  clear();
   byId("verdict").textContent = "Stopped.";
-  draw();
 };
 byId("save").onclick = () => {
   const link = document.createElement("a");

@@ -72,7 +72,7 @@ impl ChainLink {
         for side in [1.0, -1.0] {
             let centre = DVec2::new(side * straight / 2.0, 0.0);
             for i in 0..=bend {
-                let out = side * DVec2::from_angle(PI * i as f64 / bend as f64 - FRAC_PI_2);
+                let out = side * elementary::from_angle(PI * i as f64 / bend as f64 - FRAC_PI_2);
                 ring(centre + bend_radius * out, out);
             }
             for i in 1..along {

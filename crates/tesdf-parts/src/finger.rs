@@ -1,4 +1,5 @@
 use tesdf::SolidMesh;
+use tesdf::base::elementary;
 use tesdf::glam::{DVec2, DVec3};
 
 use crate::error::{PartError, above, below, positive};
@@ -82,7 +83,9 @@ impl Finger {
         }
         let segments = resolution.turn(radius, 4);
         self.hole_centres()
-            .map(|centre| angles(segments).map(|angle| centre + radius * DVec2::from_angle(angle)).collect())
+            .map(|centre| {
+                angles(segments).map(|angle| centre + radius * elementary::from_angle(angle)).collect()
+            })
             .to_vec()
     }
 

@@ -27,7 +27,7 @@ impl Lobes {
     }
 
     fn point(&self, angle: f64) -> DVec2 {
-        self.at(angle) * DVec2::from_angle(angle)
+        self.at(angle) * elementary::from_angle(angle)
     }
 
     fn at(&self, angle: f64) -> f64 {
@@ -36,7 +36,7 @@ impl Lobes {
 
     fn normal(&self, angle: f64) -> DVec2 {
         let slope = -self.amplitude * self.count as f64 * elementary::sin(self.count as f64 * angle);
-        let direction = DVec2::from_angle(angle);
+        let direction = elementary::from_angle(angle);
         (self.at(angle) * direction - slope * direction.perp()).normalize()
     }
 

@@ -6,7 +6,7 @@ use tesdf::glam::DVec2;
 
 /// A point at a distance from the origin, in a direction.
 pub(crate) fn polar(radius: f64, angle: f64) -> DVec2 {
-    radius * DVec2::from_angle(angle)
+    radius * elementary::from_angle(angle)
 }
 
 /// A circle with its first vertex on +x.

@@ -108,7 +108,8 @@ impl Solid {
         #[wasm_bindgen(unchecked_param_type = "((stage: Stage, share: number) => boolean | void) | null")]
         progress: Option<Function>,
     ) -> Result<Asset, JsError> {
-        let preset: Preset = preset.as_deref().unwrap_or("default").parse().map_err(thrown)?;
+        let preset = preset.as_deref().unwrap_or("default").parse::<Preset>();
+        let preset = preset.map_err(|message| JsError::new(&message))?;
         let asset = progress::watched(progress, |progress| {
             Encoder::new().preset(preset).progress(progress).encode(&self.solid)
         });

@@ -7,5 +7,5 @@ fn main() {
     let [input, folder] = arguments.as_slice() else { panic!("expected IN.wasm FOLDER") };
     let mut bindgen = Bindgen::new();
     let web = bindgen.input_path(input).out_name("tesdf").typescript(true).web(true).expect("web");
-    web.remove_producers_section(true).generate(folder).expect("the files can be written");
+    web.remove_producers_section(true).remove_name_section(true).generate(folder).expect("the files can be written");
 }

@@ -7,7 +7,7 @@
 //! `mul_add` are exact in IEEE 754, and so the same everywhere.
 use std::f64::consts::PI;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// The sine and the cosine.
 pub use libm::sincos as sin_cos;
@@ -25,6 +25,13 @@ pub fn powi(x: f64, n: i32) -> f64 {
         square *= square;
     }
     if n < 0 { 1.0 / power } else { power }
+}
+
+/// The direction at an angle from x towards y, in radians: `DVec2::from_angle`.
+#[inline]
+pub fn from_angle(angle: f64) -> DVec2 {
+    let (sin, cos) = sin_cos(angle);
+    DVec2::new(cos, sin)
 }
 
 /// The rotation by an angle, in radians, around an axis of length 1: `DQuat::from_axis_angle`.

@@ -193,10 +193,11 @@ fn no_files_use_each_other_in_a_cycle() {
 }
 
 /// Functions of the standard library and of glam whose last bits depend on the platform.
-const OF_PLATFORM: [&str; 37] = [
+const OF_PLATFORM: [&str; 44] = [
     "acos",
     "acosh",
     "angle_between",
+    "angle_to",
     "asin",
     "asinh",
     "atan",
@@ -208,12 +209,15 @@ const OF_PLATFORM: [&str; 37] = [
     "exp",
     "exp2",
     "exp_m1",
+    "from_angle",
+    "from_angle_translation",
     "from_axis_angle",
     "from_euler",
     "from_rotation_arc",
     "from_rotation_x",
     "from_rotation_y",
     "from_rotation_z",
+    "from_scale_angle_translation",
     "from_scaled_axis",
     "hypot",
     "ln",
@@ -223,13 +227,16 @@ const OF_PLATFORM: [&str; 37] = [
     "log2",
     "powf",
     "powi",
+    "rotate_towards",
     "sin",
     "sin_cos",
     "sinh",
     "slerp",
     "tan",
     "tanh",
+    "to_angle",
     "to_axis_angle",
+    "to_euler",
     "to_scaled_axis",
 ];
 

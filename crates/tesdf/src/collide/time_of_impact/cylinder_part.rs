@@ -136,7 +136,7 @@ impl CylinderPart {
 
 /// The direction of an edge, or between edges.
 fn direction(edge: f64) -> DVec2 {
-    DVec2::from_angle(TAU * edge / f64::from(SECTORS))
+    elementary::from_angle(TAU * edge / f64::from(SECTORS))
 }
 
 #[cfg(test)]
