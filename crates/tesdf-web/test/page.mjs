@@ -27,6 +27,7 @@ const args = `--no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader -
 const browser = await chromium.launch({ executablePath: process.env.TESDF_CHROMIUM, args });
 try {
   const page = await browser.newPage({ viewport: { width: 1200, height: 760 } });
+  page.setDefaultTimeout(120000);
   const [said, asked] = [[], []];
   page.on("console", (message) => !message.text().includes("GPU stall") && said.push(message.text()));
   page.on("pageerror", (error) => said.push(String(error)));
@@ -43,7 +44,8 @@ try {
   };
 
   await page.goto(`${address}?segments=16&length=0.024`);
-  await page.waitForSelector("body.ready");
+  await page.waitForSelector("body.ready, #failure:not([hidden])", { state: "attached" });
+  assert.equal(await page.textContent("#failure"), "");
   await picture("start");
   await page.click("#sample");
   await page.waitForSelector("#work:not([hidden])");
