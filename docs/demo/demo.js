@@ -192,7 +192,7 @@ function show({ a, b }, name, unit, place) {
   const faces = b === a ? a.faces : a.faces + b.faces;
   const bytes = b === a ? a.bytes.length : a.bytes.length + b.bytes.length;
   const count = (n) => n.toLocaleString("en");
-  byId("asset").textContent = `${count(faces)} faces, ${count(Math.round(bytes / 1000))} kB${took > 0 ? `, encoded in ${took.toFixed(1)} s` : ""}`;
+  byId("asset").textContent = `${count(faces)} faces, ${count(Math.round(bytes / 1000))} kB${took > 0 ? `, encoded in ${took.toFixed(1)} s (preset fast)` : ""}`;
   byId("ticks").children[0].textContent = length(-0.2 * state.size);
   byId("ticks").children[2].textContent = length(0.2 * state.size);
   ["slice", "pair", "save"].forEach((id) => (byId(id).hidden = false));

@@ -27,13 +27,13 @@ const calls = {
     return { report: check(bytes, name) };
   },
   // Both bodies of a file are the same asset.
-  encodeFile({ id, bytes, name, repair, preset = "default" }) {
+  encodeFile({ id, bytes, name, repair, preset = "fast" }) {
     const solid = new Solid(bytes, name, repair);
     const a = encode(id, "a", solid, preset, [0, 1]);
     bodies.b = bodies.a;
     return { a, b: a, changed: solid.changed };
   },
-  encodeSample({ id, segments = 32, length = 0.03, preset = "default" }) {
+  encodeSample({ id, segments = 32, length = 0.03, preset = "fast" }) {
     const solids = sample({ segments, length });
     const faces = [solids.a.faceCount, solids.b.faceCount];
     const share = faces[0] / (faces[0] + faces[1]);
@@ -53,7 +53,7 @@ const calls = {
     const start = performance.now();
     const rest = [0, 0, 0, 0, 0, 0, 1];
     const apart = clearance(bodies.b, bodies.a, pose, rest);
-    const options = { mode: "exact", per: "minimum", contact_distance: near };
+    const options = { mode: "exact", contact_distance: near, reduction: { per_pair: 64 } };
     const found = contacts(bodies.b, bodies.a, pose, rest, options);
     const answer = {
       distance: apart.distance,

@@ -43,7 +43,7 @@ try {
     throw new Error(`this did not come true: ${test}`);
   };
 
-  await page.goto(`${address}?segments=16&length=0.024`);
+  await page.goto(`${address}?segments=16`);
   await page.waitForSelector("body.ready, #failure:not([hidden])", { state: "attached" });
   assert.equal(await page.textContent("#failure"), "");
   await picture("start");
