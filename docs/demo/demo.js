@@ -161,6 +161,7 @@ function showPair({ distance, witnesses, points, normals, distances, ms }) {
   put("time", `${ms.toFixed(ms < 10 ? 1 : 0)} ms`);
   document.body.dataset.contacts = distances.length;
   document.body.dataset.clearance = distance;
+  document.body.dataset.shown = Number(document.body.dataset.shown ?? 0) + 1;
   draw();
 }
 

@@ -61,7 +61,7 @@ try {
   const before = await clearance();
   await page.evaluate(() => {
     const slider = document.querySelector('#pose input[aria-label^="x of"]');
-    slider.value = 0.75;
+    slider.value = 0.6;
     slider.dispatchEvent(new Event("input"));
   });
   await settled(async () => (await clearance()) > before + 1e-3);
@@ -83,8 +83,9 @@ try {
   await page.mouse.move(x, y);
   await page.mouse.down();
   for (let k = 1; k <= 30; k++) {
+    const last = await page.evaluate(() => Number(document.body.dataset.shown));
     await page.mouse.move(x - 10 * k, y);
-    await page.waitForTimeout(30);
+    await settled(() => page.evaluate((last) => Number(document.body.dataset.shown) > last, last));
     if ((await clearance()) < -5e-4) break;
   }
   await page.mouse.up();
