@@ -10,6 +10,7 @@
 //! contact without a row sinks by at most `AFFINE L` more than the corners, and forces act within
 //! `LEVEL L` of their height.
 use glam::{DVec2, DVec3};
+use tesdf::geometry::internal::convex_hull;
 
 /// A contact as it matters here.
 #[derive(Clone, Copy, Debug)]
@@ -87,13 +88,12 @@ fn corners(places: &[Place], patch: &[usize]) -> Option<Vec<usize>> {
     let Place { normal, point: origin, .. } = places[patch[0]];
     let [u, v]: [DVec3; 2] = normal.any_orthonormal_pair().into();
     let in_plane = |k: usize| DVec2::new(u.dot(places[k].point - origin), v.dot(places[k].point - origin));
-    let mut points: Vec<(DVec2, usize)> = patch.iter().map(|&k| (in_plane(k), k)).collect();
-    points.sort_by(|(a, i), (b, j)| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(i.cmp(j)));
+    let hull = convex_hull(patch.iter().map(|&k| (in_plane(k), k)).collect(), ROUNDING);
     let farthest = |of: &dyn Fn(DVec2) -> f64| {
-        points.iter().copied().max_by(|(a, i), (b, j)| of(*a).total_cmp(&of(*b)).then(j.cmp(i)))
+        hull.iter().copied().max_by(|(a, i), (b, j)| of(*a).total_cmp(&of(*b)).then(j.cmp(i)))
     };
     // Three points far from each other carry the affine function.
-    let (a, first) = points[0];
+    let (a, first) = hull[0];
     let (b, second) = farthest(&|p| p.distance(a))?;
     let extent = a.distance(b);
     if extent <= 0.0 {
@@ -110,39 +110,10 @@ fn corners(places: &[Place], patch: &[usize]) -> Option<Vec<usize>> {
         false => 0.0,
     };
     let affine = |p: DVec2| gap_a + slope * along.dot(p - a) + across * along.perp_dot(p - a);
-    if points.iter().any(|&(p, k)| (places[k].gap - affine(p)).abs() > AFFINE * extent) {
+    if patch.iter().any(|&k| (places[k].gap - affine(in_plane(k))).abs() > AFFINE * extent) {
         return None;
     }
-    let mut hull = half_hull(points.iter().copied());
-    hull.extend(half_hull(points.iter().rev().copied()));
-    // Rounding makes corners along straight sides. The farthest point is a true one.
-    let start = hull.iter().position(|(p, _)| *p == b)?;
-    hull.rotate_left(start);
-    let mut corners = vec![hull[0]];
-    for k in 1..hull.len() {
-        let [(p, _), (q, _), (r, _)] = [corners[corners.len() - 1], hull[k], hull[(k + 1) % hull.len()]];
-        let is_between = (q - p).dot(r - q) > 0.0;
-        if !is_between || (r - p).perp_dot(q - p).abs() > ROUNDING * extent * (r - p).length() {
-            corners.push(hull[k]);
-        }
-    }
-    Some(corners.into_iter().map(|(_, k)| k).collect())
-}
-
-/// The corners of the right side of the convex hull of sorted points, without its last point (Andrew
-/// 1979).
-fn half_hull(points: impl Iterator<Item = (DVec2, usize)>) -> Vec<(DVec2, usize)> {
-    let mut hull: Vec<(DVec2, usize)> = Vec::new();
-    for point in points {
-        while let [.., (a, _), (b, _)] = hull[..]
-            && (point.0 - a).perp_dot(b - a) >= 0.0
-        {
-            hull.pop();
-        }
-        hull.push(point);
-    }
-    hull.pop();
-    hull
+    Some(hull.into_iter().map(|(_, k)| k).collect())
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 mod aabb;
 mod aabb_tree;
 mod barycentric;
+mod convex_hull;
 mod crossing;
 mod flat;
 mod frame;
@@ -22,6 +23,7 @@ pub(crate) mod winding;
 pub mod internal {
     pub use super::aabb_tree::{AabbTree, Child};
     pub use super::barycentric::barycentric;
+    pub use super::convex_hull::convex_hull;
     pub use super::crossing::{orientation, perturbed_orientation, signed_crossing};
     pub use super::frame::LocalFrame;
     pub use super::meet::triangles_meet;

@@ -3,6 +3,7 @@ use glam::{DVec2, DVec3};
 use super::group::force;
 use crate::collide::report::contact::Contact;
 use crate::collide::scene::ids::InstanceId;
+use crate::geometry::convex_hull;
 
 /// The convex hull of a patch's contacts, seen along its normal.
 pub struct Outline<'a> {
@@ -33,7 +34,7 @@ impl<'a> Outline<'a> {
         let distance = members.iter().map(|&i| contacts[i].distance).fold(f64::INFINITY, f64::min);
         let (center, hull) = (contacts[members[0]].point_a, Vec::new());
         let mut outline = Self { contacts, members, normal, distance, area: 0.0, center, hull, extent: 0.0 };
-        outline.hull = convex_hull(members.iter().map(|&i| (outline.flat(i), i)).collect());
+        outline.hull = convex_hull(members.iter().map(|&i| (outline.flat(i), i)).collect(), LEVEL);
         let first = outline.hull[0].0;
         outline.extent = outline.hull.iter().map(|(p, _)| p.distance(first)).fold(0.0, f64::max);
         outline.measure();
@@ -127,53 +128,11 @@ impl<'a> Outline<'a> {
             let (p, i) = rest.remove(k);
             chosen.push(i);
             polygon.push(p);
-            polygon = convex_hull(polygon.into_iter().map(|p| (p, 0)).collect())
+            polygon = convex_hull(polygon.into_iter().map(|p| (p, 0)).collect(), LEVEL)
                 .into_iter()
                 .map(|(p, _)| p)
                 .collect();
         }
         chosen
     }
-}
-
-/// The corners of the convex hull, anticlockwise (Andrew's monotone chain). A corner that rounding
-/// makes of a point on a side, or beside another corner, is left out.
-fn convex_hull(mut points: Vec<(DVec2, usize)>) -> Vec<(DVec2, usize)> {
-    points.sort_by(|(p, i), (q, j)| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(i.cmp(j)));
-    points.dedup_by(|later, first| later.0 == first.0);
-    if points.len() < 3 {
-        return points;
-    }
-    let mut hull: Vec<(DVec2, usize)> = Vec::new();
-    let chain = |hull: &mut Vec<(DVec2, usize)>, p: (DVec2, usize), start: usize| {
-        while let [.., a, b] = hull[start..]
-            && (b.0 - a.0).perp_dot(p.0 - a.0) <= 0.0
-        {
-            hull.pop();
-        }
-        hull.push(p);
-    };
-    for &p in &points {
-        chain(&mut hull, p, 0);
-    }
-    let start = hull.len() - 1;
-    for &p in points.iter().rev().skip(1) {
-        chain(&mut hull, p, start);
-    }
-    hull.pop();
-    let first = hull[0].0;
-    let level = LEVEL * hull.iter().map(|(p, _)| p.distance(first)).fold(0.0, f64::max);
-    // The distance from the line between two neighbours, or from the nearer one beyond its end.
-    let height = |hull: &[(DVec2, usize)], k: usize| {
-        let n = hull.len();
-        let (a, b, p) = (hull[(k + n - 1) % n].0, hull[(k + 1) % n].0, hull[k].0);
-        let along = (p - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE);
-        p.distance(a + along.clamp(0.0, 1.0) * (b - a))
-    };
-    while hull.len() > 2
-        && let Some(k) = (0..hull.len()).find(|&k| height(&hull, k) <= level)
-    {
-        hull.remove(k);
-    }
-    hull
 }
