@@ -13,13 +13,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 binaries=$PWD/target/binaries
 version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml)
-targets=("$@")
-if [ $# = 0 ]; then
-    case $host in
-    *-linux-gnu) targets=(x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu) ;;
-    *) targets=("$host") ;;
-    esac
-fi
 mkdir -p "$binaries"
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH

