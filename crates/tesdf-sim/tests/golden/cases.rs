@@ -300,20 +300,20 @@ fn runs(assets: &Assets, found: &mut Found) {
         run(name, &mut engine, 2e-3, 40, found);
     }
     for (name, text, steps) in SCENES {
-        let loaded = LoadedScene::parse((*text).to_owned(), "scene.toml").expect("a scene");
+        let loaded = LoadedScene::parse(format!("{HEAD}{text}"), "scene.toml").expect("a scene");
         let mut engine = loaded.newton(loaded.system().expect("a system")).expect("an engine");
         run(name, &mut engine, loaded.scene.time_step, *steps, found);
     }
 }
+
+/// The first lines of the scenes.
+const HEAD: &str = "time_step = 5e-3\nduration = 1\ngravity = [0, 0, -9.81]\n";
 
 /// Scenes of simple shapes.
 const SCENES: &[(&str, &str, usize)] = &[
     (
         "simple shapes that fall and bounce",
         r#"
-time_step = 5e-3
-duration = 1
-gravity = [0, 0, -9.81]
 [[bodies]]
 name = "floor"
 shape = "plane"
@@ -355,9 +355,6 @@ angular_velocity = [1, 2, 3]
     (
         "joints and motors",
         r#"
-time_step = 5e-3
-duration = 1
-gravity = [0, 0, -9.81]
 [[bodies]]
 name = "upper"
 shape = { box = { half_extents = [0.1, 0.02, 0.02] } }
@@ -400,9 +397,6 @@ anchor = [0.4, 0, 1]
     (
         "a wall of boxes that is hit",
         r#"
-time_step = 5e-3
-duration = 1
-gravity = [0, 0, -9.81]
 [[bodies]]
 name = "floor"
 shape = "plane"
