@@ -6,10 +6,10 @@ use std::sync::Arc;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
+use tesdf::Progress;
 use tesdf::base::{Named, unit};
 use tesdf::encode::{Deformation, Domain, DomainChoice, EncodeChoices, Encoder, Refinement, Threshold};
 use tesdf::mesh::RepairMode;
-use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
 use crate::errors::{Error, argument, kind_of};
@@ -102,12 +102,7 @@ pub fn encode(
     let watch = || match &progress {
         Some(progress) => {
             let (stage, share) = state.state();
-            let stage = match stage {
-                Stage::Refine => "refine",
-                Stage::Tighten => "tighten",
-                Stage::Assemble => "assemble",
-            };
-            progress.call1((stage, share)).map(|_| ())
+            progress.call1((stage.name(), share)).map(|_| ())
         }
         None => Ok(()),
     };

@@ -90,6 +90,11 @@ pub enum ThreadRows {
     Corners,
 }
 
+tesdf::named!(ThreadRows {
+    AsChords: "as-chords", "About as high as the chords of a turn are long";
+    Corners: "corners", "One for each of crest, flanks and root";
+});
+
 /// Dimensions of a size of bolt and nut, in millimetres.
 ///
 /// - Pitch: ISO 261 and 262, coarse series.

@@ -2,6 +2,7 @@
 use std::cell::{Cell, RefCell};
 
 use js_sys::Function;
+use tesdf::base::Named;
 use tesdf::{Progress, Stage};
 use wasm_bindgen::JsValue;
 
@@ -30,13 +31,8 @@ fn tell(progress: &Progress) {
         return;
     }
     LAST.set((Some(stage), share));
-    let name = match stage {
-        Stage::Refine => "refine",
-        Stage::Tighten => "tighten",
-        Stage::Assemble => "assemble",
-    };
     let told = TOLD.with_borrow(Clone::clone);
-    let answer = told.map(|told| told.call2(&JsValue::NULL, &name.into(), &share.into()));
+    let answer = told.map(|told| told.call2(&JsValue::NULL, &stage.name().into(), &share.into()));
     // An error of the function stops the encoding, too.
     if answer.is_some_and(|answer| answer.is_err() || answer == Ok(JsValue::FALSE)) {
         progress.cancel();

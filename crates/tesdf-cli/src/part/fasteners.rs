@@ -1,27 +1,8 @@
 //! Bolts and nuts.
-use clap::ValueEnum;
 use tesdf_parts::{PartError, Resolution, Size, Thread, ThreadRows};
 
 use super::{Common, Made, Make, mm};
 use crate::terminal::parse;
-
-/// Values of `--thread-rows`.
-#[derive(ValueEnum, Clone, Copy, Debug)]
-pub enum Rows {
-    /// About as high as the chords of a turn are long
-    AsChords,
-    /// One for each of crest, flanks and root
-    Corners,
-}
-
-impl From<Rows> for ThreadRows {
-    fn from(rows: Rows) -> Self {
-        match rows {
-            Rows::AsChords => Self::AsChords,
-            Rows::Corners => Self::Corners,
-        }
-    }
-}
 
 /// Arguments of `tesdf part bolt`.
 #[derive(clap::Args, Debug)]
@@ -46,8 +27,8 @@ pub struct Bolt {
     #[arg(long, value_name = "LENGTH", value_parser = parse::metres)]
     pub across_flats: Option<f64>,
     /// Rows of faces of the thread
-    #[arg(long, value_enum, value_name = "ROWS", default_value = "as-chords")]
-    pub thread_rows: Rows,
+    #[arg(long, value_name = "ROWS", value_parser = parse::named::<ThreadRows>(), default_value_t)]
+    pub thread_rows: ThreadRows,
     /// Output and resolution.
     #[command(flatten)]
     pub common: Common,
@@ -62,7 +43,7 @@ impl Make for Bolt {
         bolt.thread_length = self.thread_length.unwrap_or(longest);
         bolt.clearance = self.clearance;
         bolt.across_flats = self.across_flats.unwrap_or(bolt.across_flats);
-        bolt.rows = self.thread_rows.into();
+        bolt.rows = self.thread_rows;
         let mut facts = thread(&bolt.thread, bolt.clearance);
         facts.push(("thread length", format!("{} mm", mm(bolt.thread_length))));
         Ok(Made { solid: bolt.mesh(resolution)?, facts })
@@ -89,8 +70,8 @@ pub struct Nut {
     #[arg(long, value_name = "LENGTH", value_parser = parse::metres)]
     pub across_flats: Option<f64>,
     /// Rows of faces of the thread
-    #[arg(long, value_enum, value_name = "ROWS", default_value = "as-chords")]
-    pub thread_rows: Rows,
+    #[arg(long, value_name = "ROWS", value_parser = parse::named::<ThreadRows>(), default_value_t)]
+    pub thread_rows: ThreadRows,
     /// Output and resolution.
     #[command(flatten)]
     pub common: Common,
@@ -102,7 +83,7 @@ impl Make for Nut {
         nut.thread.pitch = self.pitch.unwrap_or(nut.thread.pitch);
         nut.height = self.height.unwrap_or(nut.height);
         nut.across_flats = self.across_flats.unwrap_or(nut.across_flats);
-        nut.rows = self.thread_rows.into();
+        nut.rows = self.thread_rows;
         nut.clearance = self.clearance.unwrap_or(nut.thread.pitch / 40.0);
         let facts = thread(&nut.thread, nut.clearance);
         Ok(Made { solid: nut.mesh(resolution)?, facts })

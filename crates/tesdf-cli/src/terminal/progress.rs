@@ -4,6 +4,7 @@ use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use tesdf::base::Named;
 use tesdf::{Progress, Stage};
 
 /// A progress bar on stderr with the estimated remaining time. Nothing is drawn unless stderr is a
@@ -28,7 +29,8 @@ impl Bar {
     }
 
     /// Sets the name of the activity. When it changes, the estimate starts again.
-    pub fn stage(&self, what: &'static str) {
+    pub fn stage(&self, what: impl Into<String>) {
+        let what = what.into();
         if self.bar.message() != what {
             self.bar.set_message(what);
             self.bar.set_position(0);
@@ -59,11 +61,7 @@ pub fn watched<T>(progress: &Progress, interrupted: &AtomicBool, work: impl FnOn
                     progress.cancel();
                 }
                 let (stage, share) = progress.state();
-                bar.stage(match stage {
-                    Stage::Refine => "1/3 cutting space into cells",
-                    Stage::Tighten => "2/3 shortening lists",
-                    Stage::Assemble => "3/3 laying out the file",
-                });
+                bar.stage(format!("{}/{} {}", stage as u8 + 1, Stage::ALL.len(), stage.meaning()));
                 bar.set(share);
                 thread::park_timeout(Duration::from_millis(100));
             }

@@ -1,6 +1,8 @@
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
+use crate::named;
+
 /// The stage of an encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
@@ -11,6 +13,12 @@ pub enum Stage {
     /// Laying out the bytes of the file.
     Assemble,
 }
+
+named!(Stage {
+    Refine: "refine", "cutting space into cells";
+    Tighten: "tighten", "shortening lists";
+    Assemble: "assemble", "laying out the file";
+});
 
 /// Progress, shared between the thread that works and a thread that watches. It tells how far the
 /// work is, and carries the request to stop.
