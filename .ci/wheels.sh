@@ -4,9 +4,10 @@
 #
 #     .ci/wheels.sh [TARGET…]
 #
-# Each wheel is for all versions of Python from 3.9. Those for Linux are checked to be manylinux2014: they run with
-# glibc 2.17. The wheel of this machine is installed in a new virtual environment, and must give its first contacts
-# within a minute. That for ARM does so under QEMU, with Debian's Python, where apt-get can download both.
+# Each wheel is for all versions of Python from 3.9, and has the texts of all licences. Those for Linux are checked to
+# be manylinux2014: they run with glibc 2.17. The wheel of this machine is installed in a new virtual environment, and
+# must give its first contacts within a minute. That for ARM does so under QEMU, with Debian's Python, where apt-get can
+# download both.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
@@ -63,12 +64,15 @@ for target in "${targets[@]}"; do
         rustup --quiet target add "$target"
     fi
     rm -rf "${wheels:?}/$target"
+    .ci/licences.py tesdf-python "$target" gpu >python/THIRD-PARTY-LICENCES.txt
     step "wheels" maturin build --quiet "${options[@]}"
     wheel=$(echo "$wheels/$target"/*.whl)
 
     size=$(wc -c <"$wheel")
     echo "$(basename "$wheel"): $((size / 1000)) kB"
     [ "$size" -le $largest ] || { echo "error: expected at most $((largest / 1000)) kB" >&2; exit 1; }
+    "$release_bin/python" -m zipfile -l "$wheel" | grep -q '/licenses/THIRD-PARTY-LICENCES.txt' ||
+        { echo "error: the wheel lacks the licences of other crates" >&2; exit 1; }
     case $target in
     *-linux-*) auditwheel show "$wheel" | tr '\n' ' ' | grep -o '"manylinux_2_17_[a-z0-9_]*"' ||
         { echo "error: the wheel is not manylinux2014: auditwheel show $wheel" >&2; exit 1; } ;;
