@@ -34,7 +34,7 @@ use crate::{classes, forces, pool};
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
 /// - device: where contacts are found, as in Scene.detect.
-/// - history: whether states, warnings and the summary are kept, which takes memory in each step.
+/// - history: whether states and the summary are kept, which takes memory in each step.
 ///   Control loops that neither save nor view their steps go without.
 ///
 /// Units are SI: metres, kilograms, seconds, radians. Bodies have the numbers of their order in the
@@ -91,7 +91,7 @@ impl Running {
 
     fn step(&mut self) -> Result<(), Error> {
         match &mut self.run {
-            Some(run) => self.world.step_of(run).map(|_| ()),
+            Some(run) => self.world.step_of(run),
             None => self.world.step().map(|_| ()),
         }
         .map_err(Error::Simulate)?;
@@ -298,12 +298,15 @@ impl Simulation {
     }
 
     /// What the steps so far did not do as the scene asks, in lines for users: bodies that overlap,
-    /// joints that came apart, energy from nowhere, steps that did not converge.
-    /// summary()["warnings"] has them with names and values.
+    /// joints that came apart, energy from nowhere, steps that did not converge. Also without a
+    /// history. summary()["warnings"] has them with names and values.
     #[getter]
-    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        let summary = self.try_read(py, |r| Ok(r.history()?.summary(r.system())))?;
-        Ok(summary.warnings.into_iter().map(|warning| warning.message).collect())
+    fn warnings(&self, py: Python<'_>) -> Vec<String> {
+        let warnings = self.read(py, |r| match &r.run {
+            Some(run) => run.summary(r.system()).warnings,
+            None => r.world.warnings(),
+        });
+        warnings.into_iter().map(|warning| warning.message).collect()
     }
 
     /// Writes the run file of the steps so far, with the bytes of that of the command.

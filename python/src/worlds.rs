@@ -23,7 +23,7 @@ use crate::{arrays, forces, pool};
 
 /// Many worlds of a scene, for control and learning: all threads step them, on the processor. What
 /// a world does is that of a Simulation with the same settings, byte for byte, on any number of
-/// threads. No history is kept.
+/// threads. No history is kept; warnings says what a world did not do as its scene asks.
 ///
 /// - scene: path of a TOML file, or a dict with the keys of such a file, as in Simulation.
 /// - count: number of worlds, n.
@@ -466,6 +466,14 @@ impl Worlds {
         PyArray1::from_vec(py, self.read(py, |worlds| worlds.iter().map(World::steps).collect()))
     }
 
+    /// Numbers of steps [n] since the beginning or the last reset that did not converge: contacts or
+    /// joints contradict each other there, or the time step is too long.
+    #[getter]
+    fn unconverged_steps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
+        let of_worlds = self.read(py, |worlds| worlds.iter().map(World::unconverged_steps).collect());
+        PyArray1::from_vec(py, of_worlds)
+    }
+
     /// Current poses [n, B, 7] of the bodies' frames, x y z qx qy qz qw.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -536,6 +544,14 @@ impl Worlds {
         let world = self.one(py, world)?;
         let found = self.read(py, |worlds| forces_of(&worlds[world]).map(|forces| forces.contacts.clone()));
         forces::of_contacts(py, &found.unwrap_or_default())
+    }
+
+    /// What the steps of a world since its beginning did not do as its scene asks, in lines for users,
+    /// as in Simulation.warnings. Overlaps are those of now, and are measured for this.
+    fn warnings(&self, py: Python<'_>, world: usize) -> PyResult<Vec<String>> {
+        let world = self.one(py, world)?;
+        let warnings = self.read(py, |worlds| worlds[world].warnings());
+        Ok(warnings.into_iter().map(|warning| warning.message).collect())
     }
 
     /// The contacts of a world at the beginning of the last step: StepContacts.

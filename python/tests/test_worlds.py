@@ -112,7 +112,6 @@ def test_without_a_history_nothing_is_kept(tmp_path):
         simulation.record,
         simulation.summary,
         simulation.run,
-        lambda: simulation.warnings,
         lambda: simulation.save(tmp_path / "run.tesrun"),
         lambda: tesdf.view(simulation, tmp_path / "run.html"),
     ]
@@ -286,3 +285,25 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(tesdf.SimulationError, match="world 1: step 0: "):
         worlds.step()
     assert worlds.steps.tolist() == [1, 0, 1]
+
+
+def test_what_is_not_obeyed_is_told_without_a_history():
+    box, press = {"half_extents": [0.05, 0.05, 0.05]}, {"half_extents": [0.1, 0.1, 0.02]}
+    bodies = [
+        {"name": "floor", "shape": "plane", "fixed": True},
+        {"name": "box", "shape": {"box": box}, "mass": 1, "translation": [0, 0, 0.05]},
+        {"name": "press", "shape": {"box": press}, "kinematic": True, "translation": [0, 0, 0.121], "velocity": [0, 0, -0.1]},
+    ]
+    scene = {"time_step": 5e-3, "duration": 0.4, "bodies": bodies}
+    recorded = tesdf.Simulation(scene)
+    recorded.run()
+    assert any("overlap by" in line and "box" in line for line in recorded.warnings), recorded.warnings
+    simulation = tesdf.Simulation(scene, history=False)
+    assert simulation.warnings == []
+    simulation.step(80)
+    assert simulation.warnings == recorded.warnings
+    worlds = tesdf.Worlds(scene, 2)
+    worlds.step(80)
+    worlds.reset([0])
+    assert worlds.warnings(0) == [] and worlds.warnings(1) == recorded.warnings
+    assert worlds.unconverged_steps.tolist() == [0, recorded.summary()["unconverged_steps"]]

@@ -68,6 +68,7 @@ use crate::{State, System, Warning};
 
 use forces::ForceRows;
 pub use hidden::HiddenPair;
+pub(crate) use hidden::HiddenPairs;
 use hidden::HiddenRows;
 pub use journal::{InterruptedRun, RunJournal};
 pub use origin::RunOrigin;

@@ -4,9 +4,12 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::newton::{Newton, Snapshot};
+use crate::record::HiddenPairs;
 use crate::scene_file::SceneFile;
 use crate::script::Scripts;
-use crate::{Dynamics, DynamicsError, Mass, Moment, Motor, Run, SimulateError, State, StepReport};
+use crate::totals::Totals;
+use crate::warning::{Watch, energies, of_hidden};
+use crate::{Dynamics, DynamicsError, Mass, Motor, Run, SimulateError, State, StepReport, Warning};
 
 /// The bodies of a scene in motion: an engine, the scripts that drive it, and its time. A clone
 /// shares meshes and scripts.
@@ -14,8 +17,26 @@ use crate::{Dynamics, DynamicsError, Mass, Moment, Motor, Run, SimulateError, St
 pub struct World {
     engine: Newton,
     beginning: Arc<Beginning>,
-    /// Number of steps since the beginning.
-    steps: u64,
+    /// The steps since the beginning.
+    made: Made,
+}
+
+/// The steps that a world has made since its beginning.
+#[derive(Clone, Debug)]
+struct Made {
+    totals: Totals,
+    watch: Watch,
+    hidden: HiddenPairs,
+}
+
+impl Made {
+    /// Notes a step that begins with the energies `before`, J, and ends at `time`, s.
+    fn add(&mut self, engine: &dyn Dynamics, report: &StepReport, before: [f64; 2], time: f64) {
+        let system = engine.system();
+        self.hidden.add(self.totals.steps, engine.hidden(), system);
+        self.totals.add(report);
+        self.watch.observe(system, before, time);
+    }
 }
 
 /// How a world begins, and what drives it.
@@ -24,6 +45,7 @@ struct Beginning {
     masses: Vec<Mass>,
     motors: Vec<Option<Motor>>,
     scripts: Scripts,
+    made: Made,
     /// s
     time_step: f64,
 }
@@ -32,7 +54,7 @@ struct Beginning {
 #[derive(Clone, Debug)]
 pub struct WorldSnapshot {
     engine: Snapshot,
-    steps: u64,
+    made: Made,
 }
 
 impl World {
@@ -42,14 +64,17 @@ impl World {
     /// [`SimulateError::Script`] when a script does not match the bodies and joints.
     pub fn new(scene: &SceneFile, engine: Newton) -> Result<Self, SimulateError> {
         let system = engine.system();
+        let (totals, watch) = (Totals::default(), Watch::new(scene, system));
+        let made = Made { totals, watch, hidden: HiddenPairs::default() };
         let beginning = Beginning {
             states: system.states().to_vec(),
             masses: system.bodies().iter().map(|body| body.mass).collect(),
             motors: system.joints().iter().map(|joint| joint.motor).collect(),
             scripts: Scripts::new(&scene.scripts, system).map_err(SimulateError::Script)?,
+            made: made.clone(),
             time_step: scene.time_step,
         };
-        Ok(Self { engine, beginning: Arc::new(beginning), steps: 0 })
+        Ok(Self { engine, beginning: Arc::new(beginning), made })
     }
 
     /// The engine.
@@ -64,12 +89,29 @@ impl World {
 
     /// Number of steps since the beginning.
     pub fn steps(&self) -> u64 {
-        self.steps
+        self.made.totals.steps
+    }
+
+    /// Number of steps since the beginning that did not converge ([`StepReport::converged`]).
+    pub fn unconverged_steps(&self) -> u64 {
+        self.made.totals.unconverged
+    }
+
+    /// What the steps since the beginning did not do as the scene asks, and the overlap of the
+    /// present states, which is measured for this.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let (system, Made { totals, watch, hidden }) = (self.engine.system(), &self.made);
+        let time = |step: u64| step as f64 * self.time_step();
+        let hidden = hidden.pairs(|body| system.bodies()[body].name.clone());
+        let mut warnings: Vec<_> = hidden.iter().map(|pair| of_hidden(pair, time(pair.first_step))).collect();
+        warnings.extend(watch.overlap(system, self.time()));
+        warnings.extend(watch.so_far(system, totals));
+        warnings
     }
 
     /// Time since the beginning, s.
     pub fn time(&self) -> f64 {
-        self.steps as f64 * self.beginning.time_step
+        self.steps() as f64 * self.beginning.time_step
     }
 
     /// The time step, s.
@@ -93,12 +135,13 @@ impl World {
     /// # Errors
     /// [`SimulateError::Step`]; the states are then those before the step.
     pub fn step(&mut self) -> Result<StepReport, SimulateError> {
-        let Self { engine, beginning, steps } = self;
-        let h = beginning.time_step;
-        let failed = |source| SimulateError::Step { step: *steps, source };
-        beginning.scripts.drive(engine, *steps as f64 * h, h).map_err(failed)?;
+        let Self { engine, beginning, made } = self;
+        let (step, h) = (made.totals.steps, beginning.time_step);
+        let failed = |source| SimulateError::Step { step, source };
+        beginning.scripts.drive(engine, step as f64 * h, h).map_err(failed)?;
+        let before = energies(engine.system());
         let report = engine.step(h).map_err(failed)?;
-        *steps += 1;
+        made.add(engine, &report, before, (step + 1) as f64 * h);
         Ok(report)
     }
 
@@ -106,10 +149,12 @@ impl World {
     ///
     /// # Errors
     /// As [`Run::step`].
-    pub fn step_of<'a>(&'a mut self, run: &'a mut Run) -> Result<Moment<'a>, SimulateError> {
+    pub fn step_of(&mut self, run: &mut Run) -> Result<(), SimulateError> {
+        let before = energies(self.engine.system());
         let moment = run.step(&mut self.engine)?;
-        self.steps = moment.step;
-        Ok(moment)
+        let (report, time) = (moment.report, moment.time);
+        self.made.add(&self.engine, &report, before, time);
+        Ok(())
     }
 
     /// Begins again at time 0 with these states, or those at the [beginning](Self::first_states).
@@ -119,16 +164,16 @@ impl World {
     /// # Errors
     /// As [`Newton::reset`]; nothing changes then.
     pub fn reset(&mut self, states: Option<Vec<State>>) -> Result<(), DynamicsError> {
-        let Self { engine, beginning, steps } = self;
+        let Self { engine, beginning, .. } = self;
         engine.reset(states.unwrap_or_else(|| beginning.states.clone()))?;
         beginning.motors.iter().enumerate().try_for_each(|(joint, motor)| engine.set_motor(joint, *motor))?;
-        *steps = 0;
+        self.made = self.beginning.made.clone();
         Ok(())
     }
 
     /// What [`restore`](Self::restore) needs to go back to this moment.
     pub fn snapshot(&self) -> WorldSnapshot {
-        WorldSnapshot { engine: self.engine.snapshot(), steps: self.steps }
+        WorldSnapshot { engine: self.engine.snapshot(), made: self.made.clone() }
     }
 
     /// Goes back to a snapshot of this world or of a clone.
@@ -137,7 +182,7 @@ impl World {
     /// As [`Newton::restore`].
     pub fn restore(&mut self, snapshot: &WorldSnapshot) -> Result<(), DynamicsError> {
         self.engine.restore(&snapshot.engine)?;
-        self.steps = snapshot.steps;
+        self.made = snapshot.made.clone();
         Ok(())
     }
 }

@@ -30,6 +30,49 @@ impl HiddenPair {
     }
 }
 
+/// The pairs of bodies with a hidden overlap, by their numbers, with the first step, the number of
+/// steps and the greatest depth.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct HiddenPairs(BTreeMap<[u32; 2], (u64, u64, f64)>);
+
+impl HiddenPairs {
+    /// Adds an overlap at the beginning of a step. The steps ascend.
+    fn note(&mut self, step: u64, ids: [u32; 2], depth: f64) {
+        let (_, steps, deepest) = self.0.entry(ids).or_insert((step, 0, depth));
+        *steps += 1;
+        *deepest = deepest.max(depth);
+    }
+
+    /// Adds the overlaps at the beginning of a step. The steps ascend.
+    pub fn add(&mut self, step: u64, overlaps: &[HiddenOverlap], system: &System) {
+        for (ids, depth) in of_bodies(overlaps, system) {
+            self.note(step, ids, depth);
+        }
+    }
+
+    /// The pairs, sorted by the numbers of their bodies, which have these names.
+    pub fn pairs(&self, name: impl Fn(usize) -> String) -> Vec<HiddenPair> {
+        let pair = |(&ids, &(first_step, steps, depth)): (&[u32; 2], &(u64, u64, f64))| HiddenPair {
+            bodies: ids.map(|body| name(body as usize)),
+            first_step,
+            steps,
+            depth,
+        };
+        self.0.iter().map(pair).collect()
+    }
+}
+
+/// The numbers of the bodies of overlaps, and the depths.
+fn of_bodies<'a>(
+    overlaps: &'a [HiddenOverlap],
+    system: &'a System,
+) -> impl Iterator<Item = ([u32; 2], f64)> + 'a {
+    overlaps.iter().filter_map(|overlap| {
+        let [a, b] = [overlap.instance_a, overlap.instance_b].map(|instance| system.body_of(instance));
+        Some(([a? as u32, b? as u32], overlap.depth))
+    })
+}
+
 /// All hidden overlaps of a record, one row per step and pair. Steps ascend.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct HiddenRows {
@@ -59,29 +102,20 @@ impl RunRecord {
     /// Appends the hidden overlaps at the beginning of `step`. The steps of successive calls must
     /// ascend.
     pub fn push_hidden(&mut self, step: u64, overlaps: &[HiddenOverlap], system: &System) {
-        for overlap in overlaps {
-            let bodies = [overlap.instance_a, overlap.instance_b].map(|instance| system.body_of(instance));
-            if let [Some(a), Some(b)] = bodies {
-                self.hidden.steps.push(step);
-                self.hidden.ids.push([a as u32, b as u32]);
-                self.hidden.depths.push(overlap.depth);
-            }
+        for (ids, depth) in of_bodies(overlaps, system) {
+            self.hidden.steps.push(step);
+            self.hidden.ids.push(ids);
+            self.hidden.depths.push(depth);
         }
     }
 
     /// The pairs of bodies with a hidden overlap at the beginning of some step, sorted by their
     /// numbers.
     pub fn hidden_pairs(&self) -> Vec<HiddenPair> {
-        let mut pairs: BTreeMap<[u32; 2], HiddenPair> = BTreeMap::new();
-        let rows = &self.hidden;
+        let (mut pairs, rows) = (HiddenPairs::default(), &self.hidden);
         for ((&step, &ids), &depth) in rows.steps.iter().zip(&rows.ids).zip(&rows.depths) {
-            let pair = pairs.entry(ids).or_insert_with(|| {
-                let bodies = ids.map(|body| self.bodies.get(body as usize).cloned().unwrap_or_default());
-                HiddenPair { bodies, first_step: step, steps: 0, depth }
-            });
-            pair.steps += 1;
-            pair.depth = pair.depth.max(depth);
+            pairs.note(step, ids, depth);
         }
-        pairs.into_values().collect()
+        pairs.pairs(|body| self.bodies.get(body).cloned().unwrap_or_default())
     }
 }

@@ -1,10 +1,14 @@
 //! Worlds that are set, begun again and gone back to make the same steps as single runs.
+use std::ops::ControlFlow;
+
 use rayon::ThreadPoolBuilder;
 use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::LoadedScene;
-use tesdf_sim::{Drive, Dynamics, DynamicsError, Mass, MassProperties, Motor, State, World, Worlds, Wrench};
+use tesdf_sim::{
+    Drive, Dynamics, DynamicsError, Mass, MassProperties, Motor, State, World, Worlds, Wrench, simulate,
+};
 
 /// A stack that falls asleep, a door with a motor, a pendulum of two links, two balls with
 /// restitution, two boxes that overlap deeply, and a plate that a script moves.
@@ -340,4 +344,49 @@ fn what_does_not_fit_is_refused() {
     engine.clone().restore(&engine.snapshot()).unwrap();
     let motor = Some(Motor { drive: Drive::Velocity(1.0), limit: 1.0 });
     assert!(engine.set_motor(0, motor).is_err());
+}
+
+/// A press crushes a box. A world says of it what a run says, and nothing after a reset.
+#[test]
+fn worlds_tell_what_a_run_tells() {
+    let press = r#"
+time_step = 5e-3
+duration = 0.4
+[[bodies]]
+name = "floor"
+shape = "plane"
+fixed = true
+[[bodies]]
+name = "box"
+shape = { box = { half_extents = [0.05, 0.05, 0.05] } }
+mass = 1
+translation = [0, 0, 0.05]
+[[bodies]]
+name = "press"
+shape = { box = { half_extents = [0.1, 0.1, 0.02] } }
+kinematic = true
+translation = [0, 0, 0.121]
+velocity = [0, 0, -0.1]
+"#;
+    for mode in ["", "[detector]\nmode = \"node\"\n"] {
+        let text = press.to_owned() + mode;
+        let loaded = loaded(&text);
+        let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
+        let run = simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap().1;
+        assert!(!run.warnings.is_empty());
+        let mut world = world(&text);
+        let first = world.snapshot();
+        for _ in 0..run.steps {
+            world.step().unwrap();
+        }
+        assert_eq!(world.warnings(), run.warnings);
+        assert_eq!(world.unconverged_steps(), run.unconverged_steps);
+        let last = world.snapshot();
+        world.reset(None).unwrap();
+        assert_eq!(world.warnings(), []);
+        world.restore(&last).unwrap();
+        assert_eq!(world.warnings(), run.warnings);
+        world.restore(&first).unwrap();
+        assert_eq!((world.warnings(), world.unconverged_steps()), (Vec::new(), 0));
+    }
 }
