@@ -12,6 +12,7 @@ gets a row `cannot: why`. The peers get lengths in millimetres.
 """
 import argparse
 import atexit
+import functools
 import multiprocessing
 import os
 import shutil
@@ -73,6 +74,47 @@ def trimesh(vertices, faces, _):
     return lambda points: -trimesh.proximity.signed_distance(mesh, points)
 
 
+@functools.cache
+def warp_kernel():
+    import warp
+
+    warp.config.log_level = warp.LOG_WARNING
+
+    @warp.kernel(module="unique")
+    def signed(mesh: warp.uint64, sign: int, points: warp.array(dtype=warp.vec3), out: warp.array(dtype=float)):
+        p = points[warp.tid()]
+        query = warp.mesh_query_point_sign_normal(mesh, p, 1.0e9)
+        if sign == 1:
+            query = warp.mesh_query_point_sign_parity(mesh, p, 1.0e9)
+        if sign == 2:
+            query = warp.mesh_query_point_sign_winding_number(mesh, p, 1.0e9)
+        nearest = warp.mesh_eval_position(mesh, query.face, query.u, query.v)
+        out[warp.tid()] = query.sign * warp.length(p - nearest)
+
+    return signed
+
+
+def warp(sign):
+    def build(vertices, faces, _):
+        import warp
+
+        signed = warp_kernel()
+        kind = ["normal", "parity", "winding number"].index(sign)
+        indices = warp.array(faces.astype(np.int32).ravel(), dtype=int, device="cpu")
+        corners = warp.array(vertices.astype(np.float32), dtype=warp.vec3, device="cpu")
+        mesh = warp.Mesh(corners, indices, support_winding_number=kind == 2)
+
+        def query(points):
+            out = warp.zeros(len(points), dtype=float, device="cpu")
+            at = warp.array(points.astype(np.float32), dtype=warp.vec3, device="cpu")
+            warp.launch(signed, dim=len(points), inputs=[mesh.id, kind, at, out], device="cpu")
+            return out.numpy()
+
+        return query
+
+    return build
+
+
 # Name, distribution, module, results, and whether every call builds the trees again.
 CONTENDERS = [
     ("tesdf f64", "tesdf", "tesdf", "distance, gradient, point, face; f64", ours("f64"), False),
@@ -81,6 +123,9 @@ CONTENDERS = [
     ("libigl pseudonormal", "libigl", "igl", "distance, point, normal, face; f64", libigl("PSEUDONORMAL"), True),
     ("libigl winding number", "libigl", "igl", "distance, point, face; f64", libigl("WINDING_NUMBER"), True),
     ("libigl fast winding number", "libigl", "igl", "distance, point, face; f64", libigl("FAST_WINDING_NUMBER"), True),
+    ("Warp normal", "warp-lang", "warp", "distance, face; f32", warp("normal"), False),
+    ("Warp parity", "warp-lang", "warp", "distance, face; f32", warp("parity"), False),
+    ("Warp winding number", "warp-lang", "warp", "distance, face; f32", warp("winding number"), False),
     ("trimesh", "trimesh", "trimesh", "distance; f64", trimesh, False),
 ]
 
