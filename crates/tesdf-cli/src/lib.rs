@@ -4,7 +4,7 @@
 //! `-o /dev/stdout`, stdout carries only the bytes of the output. The exit code is 0 when the
 //! command did its work. It is 1 when a mesh or file has defects (`check`, `repair`, `verify`,
 //! `encode-all`) or a run does not meet its criterion (`simulate`). It is 2 for bad usage or input,
-//! an output that cannot be written, too little memory, and Ctrl-C.
+//! an output that cannot be written, too little memory or no threads, and Ctrl-C.
 #![warn(missing_docs)]
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
