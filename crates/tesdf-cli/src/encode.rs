@@ -3,7 +3,6 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::asset::about::{Repair, Source, Statistics};
 use tesdf::base::{InsideRule, unit};
@@ -126,11 +125,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.split {
         return split::run(args);
     }
-    let mut pool = ThreadPoolBuilder::new();
-    if let Some(threads) = args.threads {
-        pool = pool.num_threads(threads.into());
-    }
-    let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
     let output = output::open(&args.output, &args.inputs(), args.consent)?;
     if MeshFormat::of_path(&args.output).is_ok() {
         let output = args.output.display();
@@ -145,7 +139,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let options = choices.options().map_err(Failure::new)?;
     let how =
         SolidOptions { inside: options.inside, repair: args.choices.repair_mode(), cad: args.cad.options() };
-    let loaded = pool.install(|| SolidMesh::load(&args.mesh, &how)).map_err(|e| refused(args, &e))?;
+    let loaded = SolidMesh::load(&args.mesh, &how).map_err(|e| refused(args, &e))?;
     let source = loaded.source();
     let LoadedSolid { solid, report: load, repaired, .. } = loaded;
     let options = options.or_unit(load.unit.as_deref());
@@ -164,7 +158,8 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let sampler = args.device.sampler()?;
     let encoded = watched(&progress, interrupted, || {
-        pool.install(|| {
+        // On a thread of the pool: from outside, each parallel call would switch threads twice.
+        rayon::scope(|_| {
             let encoder =
                 Encoder::new().options(options).source(source).sampler(&*sampler).progress(&progress);
             encode(&solid, &args.mesh, &choices, encoder, &progress)

@@ -4,7 +4,7 @@
 //! `-o /dev/stdout`, stdout carries only the bytes of the output. The exit code is 0 when the
 //! command did its work. It is 1 when a mesh or file has defects (`check`, `repair`, `verify`,
 //! `encode-all`) or a run does not meet its criterion (`simulate`). It is 2 for bad usage or input,
-//! an output that cannot be written, too little memory, and Ctrl-C.
+//! an output that cannot be written, too little memory or no threads, and Ctrl-C.
 #![warn(missing_docs)]
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,6 +12,7 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
+use rayon::ThreadPoolBuilder;
 
 mod abort;
 pub mod check;
@@ -116,7 +117,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
         }
     };
-    if let Err(failure) = interrupt::install() {
+    if let Err(failure) = interrupt::install().and_then(|()| start_threads(&cli.command)) {
         report::error(&failure);
         return ExitCode::from(2);
     }
@@ -133,6 +134,18 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Starts the threads that all commands share. Rayon would panic where it cannot start them.
+fn start_threads(command: &Command) -> Result<(), Failure> {
+    let asked = match command {
+        Command::Encode(args) => args.threads,
+        Command::EncodeAll(args) => args.threads,
+        _ => None,
+    };
+    // 0: as many as processors, or as the environment says.
+    let threads = ThreadPoolBuilder::new().num_threads(asked.map_or(0, usize::from));
+    threads.build_global().map_err(report::no_threads)
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {

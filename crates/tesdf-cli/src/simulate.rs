@@ -309,7 +309,6 @@ impl<'a> LiveProgress<'a> {
         if let Ok(style) = ProgressStyle::with_template("[{bar:24}] {percent:>3} %  {eta} left  {msg}") {
             bar.set_style(style.progress_chars("=> "));
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar, interrupted, begin: Instant::now() }
     }
 

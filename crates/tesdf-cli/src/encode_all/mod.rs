@@ -171,13 +171,13 @@ fn pools(threads: usize, jobs: usize) -> Result<Vec<ThreadPool>, Failure> {
     let of = |job: usize| (threads / jobs + usize::from(job < threads % jobs)).max(1);
     let pool = |job| ThreadPoolBuilder::new().num_threads(of(job)).build();
     let pools: Result<_, _> = (0..jobs).map(pool).collect();
-    pools.map_err(|e| Failure::new(format!("cannot start threads: {e}")))
+    pools.map_err(report::no_threads)
 }
 
 /// Encodes the meshes, each in one of the pools.
 ///
 /// # Errors
-/// Ctrl-C was pressed.
+/// Ctrl-C was pressed, or no thread can be started. Where some cannot, the others do their work.
 fn all(job: &Job, meshes: &[Mesh], pools: &[ThreadPool]) -> Result<Vec<Done>, Failure> {
     let interrupted = interrupt::flag();
     // The large ones first: the last mesh to end is then a small one, and few threads are idle.
@@ -204,24 +204,30 @@ fn all(job: &Job, meshes: &[Mesh], pools: &[ThreadPool]) -> Result<Vec<Done>, Fa
         }
     };
     thread::scope(|scope| {
-        let main = thread::current();
+        let (main, mut started) = (thread::current(), 0);
         for pool in pools {
             let (work, ended, main) = (&work, &ended, main.clone());
-            scope.spawn(move || {
+            let of_pool = move || {
                 work(pool);
                 ended.fetch_add(1, Ordering::Release);
                 main.unpark();
-            });
+            };
+            match thread::Builder::new().spawn_scoped(scope, of_pool) {
+                Ok(_) => started += 1,
+                Err(e) if started == 0 => return Err(report::no_threads(e)),
+                Err(_) => break,
+            }
         }
         let bar = Bar::new("encoding");
-        while ended.load(Ordering::Acquire) < pools.len() {
+        while ended.load(Ordering::Acquire) < started {
             if interrupted.load(Ordering::Relaxed) {
                 stop.cancel();
             }
             bar.set(lock().1 as f64 / whole);
             thread::park_timeout(Duration::from_millis(100));
         }
-    });
+        Ok(())
+    })?;
     let (found, _) = found.into_inner().unwrap_or_else(PoisonError::into_inner);
     let count = found.iter().flatten().count();
     // Without Ctrl-C, all are done.

@@ -23,16 +23,19 @@ pub fn install() -> Result<(), Failure> {
     let ignored = is_ignored(libc::SIGHUP);
     ctrlc::set_handler(|| {
         let again = INTERRUPTED.swap(true, Ordering::Relaxed);
-        if !again && IS_WATCHED.load(Ordering::Relaxed) {
-            thread::spawn(|| {
-                thread::sleep(GRACE);
-                end();
-            });
+        let later = || {
+            thread::sleep(GRACE);
+            end();
+        };
+        if !again && IS_WATCHED.load(Ordering::Relaxed) && thread::Builder::new().spawn(later).is_ok() {
             return;
         }
         end();
     })
-    .map_err(|e| Failure::new(format!("cannot handle Ctrl-C: {e}")))?;
+    .map_err(|e| match e {
+        ctrlc::Error::System(reason) => Failure::new(format!("cannot handle Ctrl-C: {reason}")),
+        e => Failure::new(format!("cannot handle Ctrl-C: {e}")),
+    })?;
     #[cfg(unix)]
     if ignored {
         // SAFETY: it only sets that the signal is ignored, as it was.

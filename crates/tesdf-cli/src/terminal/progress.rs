@@ -24,7 +24,6 @@ impl Bar {
         if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent:>3} %  {eta} left") {
             bar.set_style(style.progress_chars("=> "));
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar }
     }
 
@@ -50,11 +49,12 @@ impl Drop for Bar {
     }
 }
 
-/// Runs `work` while another thread draws its progress and passes Ctrl-C on to it.
+/// Runs `work` while another thread draws its progress and passes Ctrl-C on to it. Where that thread
+/// cannot be started, nothing is drawn, and Ctrl-C ends the process after a second.
 pub fn watched<T>(progress: &Progress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
-        let watcher = scope.spawn(|| {
+        let watch = || {
             let bar = Bar::new("encoding");
             while !done.load(Ordering::Acquire) {
                 if interrupted.load(Ordering::Relaxed) {
@@ -65,11 +65,14 @@ pub fn watched<T>(progress: &Progress, interrupted: &AtomicBool, work: impl FnOn
                 bar.set(share);
                 thread::park_timeout(Duration::from_millis(100));
             }
-        });
+        };
+        let watcher = thread::Builder::new().spawn_scoped(scope, watch);
         // `work` may panic; without this the scope would wait for the watcher forever.
         let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
         done.store(true, Ordering::Release);
-        watcher.thread().unpark();
+        if let Ok(watcher) = watcher {
+            watcher.thread().unpark();
+        }
         result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
 }

@@ -86,6 +86,12 @@ pub fn usage(found: &clap::Error) {
     let _ = if clean == plain { found.print() } else { writeln!(io::stderr(), "{clean}") };
 }
 
+/// The failure where the system refuses threads.
+pub fn no_threads(reason: impl fmt::Display) -> Failure {
+    Failure::new(format!("cannot start threads: {reason}"))
+        .hint("set the environment variable RAYON_NUM_THREADS to 1; `encode` and `encode-all` have --threads")
+}
+
 /// Prints `error:` and `hint:` lines.
 pub fn error(failure: &Failure) {
     line("error", "31", &failure.message);

@@ -9,6 +9,8 @@ mod conforming_domains;
 mod devices;
 mod encode_all;
 mod encode_query_verify;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod faults;
 mod folder;
 mod inside;
 #[cfg(target_os = "linux")]

@@ -1,6 +1,10 @@
 //! `tesdf import`, and `tesdf export` of an asset: JSON of TES-Encoder.
 
-use crate::folder::Folder;
+use std::fs;
+
+use crate::folder::{Folder, data};
+use tesdf::TeSdf;
+use tesdf::glam::DVec3;
 
 /// A tetrahedron with three right angles, and another over its slanted face, whose list is LIST.
 const FILE: &str = r#"{
@@ -41,6 +45,26 @@ fn a_file_is_imported_verified_and_exported() {
     let found: serde_json::Value = serde_json::from_str(&text).unwrap();
     let most = found["prove"]["nearer_by"].as_f64().unwrap();
     assert!(most > 0.1 && most <= 1.0, "{most}");
+}
+
+/// A file that was written once must continue to open, and to give the same answers and bytes.
+/// `TESDF_WRITE_GOLDEN=1` writes it.
+#[test]
+fn the_golden_file_answers() {
+    let (folder, golden) = (Folder::new(), data("golden_tes.json"));
+    if std::env::var_os("TESDF_WRITE_GOLDEN").is_some() {
+        folder.write("hand.json", FILE.replace("LIST", "2"));
+        folder.good(&["import", "hand.json", "-o", "hand.tesdf"]);
+        folder.good(&["export", "hand.tesdf", "-o", &golden]);
+    }
+    folder.good(&["import", &golden, "-o", "a.tesdf"]);
+    let asset = TeSdf::open(folder.path("a.tesdf")).unwrap();
+    for (p, expected) in [(0.1, -0.1), (0.25, -0.25 / 3.0_f64.sqrt()), (0.5, 0.5 / 3.0_f64.sqrt())] {
+        let found = asset.signed_distance(DVec3::splat(p));
+        assert!((found - expected).abs() < 1e-15, "{p}: {found}");
+    }
+    folder.good(&["export", "a.tesdf", "-o", "again.json"]);
+    assert!(fs::read(folder.path("again.json")).unwrap() == fs::read(golden).unwrap());
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod deep;
 mod forces;
 mod friction;
 mod gear_ratio;
+mod golden_runs;
 mod insertion;
 mod joints;
 mod journal;

@@ -81,8 +81,12 @@ impl Destination {
 
     fn file(target: PathBuf, path: &Path) -> Result<Kind, SaveError> {
         let folder = folder_of(&target);
-        if !folder.is_dir() {
-            return Err(SaveError::NoFolder { path: path.to_path_buf(), folder: folder.to_path_buf() });
+        match fs::metadata(folder) {
+            Ok(found) if found.is_dir() => {}
+            Err(e) if !matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                return Err(SaveError::io("find the folder", folder)(e));
+            }
+            _ => return Err(SaveError::NoFolder { path: path.to_path_buf(), folder: folder.to_path_buf() }),
         }
         // Creates a file and removes it again: no other test shows that the folder accepts files.
         drop(Part::new(&target, path)?);

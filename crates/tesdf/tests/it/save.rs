@@ -53,6 +53,20 @@ fn saving_replaces_whole_files_and_leaves_no_part_files() {
     assert_eq!(names(folder.path()), ["a.tesdf"]);
 }
 
+/// Another process puts a folder in the place of the file while it is written.
+#[test]
+fn a_rename_that_fails_leaves_nothing() {
+    let folder = folder();
+    let path = folder.path().join("a.tesdf");
+    let mut part = destination(&path).unwrap().part().unwrap().expect("a regular file");
+    part.write_all(b"new").unwrap();
+    fs::create_dir(&path).unwrap();
+    let found = part.finish().unwrap_err().to_string();
+    assert!(found.starts_with("cannot replace ") && found.contains("a.tesdf: "), "{found}");
+    assert_eq!(names(folder.path()), ["a.tesdf"]);
+    assert_eq!(fs::read_dir(&path).unwrap().count(), 0);
+}
+
 #[test]
 fn an_output_that_is_an_input_is_refused() {
     let folder = folder();
