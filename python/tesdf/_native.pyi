@@ -919,8 +919,8 @@ class Simulation:
     @property
     def warnings(self) -> list[str]:
         """What the steps so far did not do as the scene asks, in lines for users: bodies that overlap,
-        joints that came apart, energy from nowhere, steps that did not converge.
-        summary()["warnings"] has them with names and values."""
+        joints that came apart, energy from nowhere, steps that did not converge. Also without a
+        history. summary()["warnings"] has them with names and values."""
     @property
     def bodies(self) -> list[str]:
         """Names of the bodies."""
