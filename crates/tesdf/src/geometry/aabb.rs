@@ -63,3 +63,55 @@ impl Aabb {
         (self.min - p).max(p - self.max).max(DVec3::ZERO).length_squared()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_of_known_sizes() {
+        let b = Aabb::of(&[DVec3::new(1.0, 6.0, 3.0), DVec3::new(2.0, 4.0, 8.0)]);
+        assert_eq!((b.min, b.max), (DVec3::new(1.0, 4.0, 3.0), DVec3::new(2.0, 6.0, 8.0)));
+        assert_eq!((b.extent(), b.center()), (DVec3::new(1.0, 2.0, 5.0), DVec3::new(1.5, 5.0, 5.5)));
+        let grown = b.grown(0.5);
+        assert_eq!((grown.min, grown.max), (b.min - 0.5, b.max + 0.5));
+        assert_eq!(b.union(Aabb::of(&[DVec3::ZERO])), Aabb { min: DVec3::ZERO, max: b.max });
+        assert_eq!(b.union(Aabb::EMPTY), b);
+        assert_eq!(b.distance_squared(DVec3::new(0.0, 5.0, 10.0)), 5.0);
+        assert_eq!(b.distance_squared(DVec3::new(4.0, 4.5, 3.0)), 4.0);
+    }
+
+    #[test]
+    fn boxes_contain_and_overlap_on_their_sides() {
+        let b = Aabb::of(&[DVec3::ZERO, DVec3::ONE]);
+        for axis in 0..3 {
+            let unit = DVec3::from_array(std::array::from_fn(|k| f64::from(k == axis)));
+            for (step, beside) in [(1.0, true), (1.1, false), (-1.0, true), (-1.1, false)] {
+                let moved = Aabb { min: b.min + step * unit, max: b.max + step * unit };
+                assert_eq!((b.overlaps(moved), moved.overlaps(b)), (beside, beside), "{step} {unit}");
+                let p = DVec3::splat(0.5) + (step - 0.5f64.copysign(step)) * unit;
+                assert_eq!((b.contains(p), b.distance_squared(p) == 0.0), (beside, beside), "{p}");
+            }
+        }
+        assert!(!b.contains(DVec3::NAN) && !b.overlaps(Aabb::EMPTY));
+    }
+
+    #[test]
+    fn rounded_boxes_hold_the_box() {
+        let middle = DVec3::new(0.1, -0.7, 1e6);
+        for k in 0..100 {
+            let low = DVec3::new(0.013, -0.171, 0.3) * f64::from(k);
+            let b = Aabb { min: low, max: low + DVec3::new(0.0, 1e-9, 0.7) };
+            let rounded = b.rounded_from(middle);
+            for axis in 0..3 {
+                let (low, high) = (b.min[axis] - middle[axis], b.max[axis] - middle[axis]);
+                let (to_low, to_high) = (f64::from(rounded[axis]), f64::from(rounded[axis + 3]));
+                assert!(to_low < low && high < to_high, "{k} {axis}");
+                assert!(
+                    low - to_low < 3e-7 * low.abs() + 1e-40 && to_high - high < 3e-7 * high.abs() + 1e-40,
+                    "{k} {axis}"
+                );
+            }
+        }
+    }
+}

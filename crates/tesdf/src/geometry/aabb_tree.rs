@@ -224,7 +224,8 @@ fn best_bin(boxes: &[Aabb], items: &[u32], spread: Aabb, axis: usize) -> Option<
     let mut best: Option<(f64, usize, usize)> = None;
     for k in 0..BINS - 1 {
         left = (left.0.union(bins[k].0), left.1 + bins[k].1);
-        if left.1 == 0 || right[k].1 == 0 {
+        // The lowest item is in the first bin; all are there where the extent is not finite.
+        if right[k].1 == 0 {
             continue;
         }
         let cost = area(left.0) * left.1 as f64 + area(right[k].0) * right[k].1 as f64;
@@ -275,5 +276,74 @@ mod tests {
     fn a_tree_may_be_empty() {
         let tree = AabbTree::build(&[], 4);
         assert_eq!(tree.nearest(DVec3::ZERO, |_| 0.0), None);
+    }
+
+    #[test]
+    fn visits_reach_the_leaves_whose_boxes_are_accepted() {
+        let items = points(300);
+        let boxes: Vec<Aabb> = items.iter().map(|&p| Aabb::of(&[p, p + 0.1])).collect();
+        let tree = AabbTree::build(&boxes, 1);
+        for q in &items {
+            let mut found = Vec::new();
+            tree.visit(|b| b.contains(*q), |leaf| found.extend_from_slice(leaf));
+            found.sort_unstable();
+            let expected: Vec<u32> = (0..300).filter(|&i| boxes[i as usize].contains(*q)).collect();
+            assert_eq!(found, expected);
+        }
+    }
+
+    /// Depth of a subtree, whose boxes must hold all items below.
+    fn depth(tree: &AabbTree, (bounds, child): (Aabb, Child), boxes: &[Aabb]) -> usize {
+        match child {
+            Child::Node(n) => {
+                let sides = tree.nodes()[n as usize];
+                assert_eq!(bounds, sides[0].0.union(sides[1].0));
+                1 + sides.map(|side| depth(tree, side, boxes)).into_iter().max().unwrap()
+            }
+            Child::Leaf { start, end } => {
+                let items = tree.order()[start as usize..end as usize].iter();
+                assert_eq!(bounds, items.fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize])));
+                0
+            }
+        }
+    }
+
+    /// Points that halve their distance from a corner again and again: a split by cost leaves most of
+    /// them on one side. And points so far apart that their distance is not a number.
+    #[test]
+    fn points_of_all_sizes_do_not_make_a_deep_tree() {
+        let along = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 0.5)];
+        for way in along {
+            let items: Vec<DVec3> = (0..900).map(|k| way * 2f64.powi(-k)).collect();
+            let boxes: Vec<Aabb> = items.iter().map(|&p| Aabb::of(&[p])).collect();
+            let tree = AabbTree::build(&boxes, 1);
+            let found = depth(&tree, tree.root(), &boxes);
+            assert!((MEDIAN_DEPTH..=MEDIAN_DEPTH + 10).contains(&found), "{way}: {found}");
+            for k in [0, 1, 100, 400, 899] {
+                let near = |i: u32| (items[i as usize] - items[k]).abs().max_element();
+                assert_eq!(
+                    tree.nearest(items[k], |i| if near(i) == 0.0 { 0.0 } else { 9.0 }),
+                    Some((0.0, k as u32))
+                );
+            }
+        }
+        let far: Vec<Aabb> =
+            (0..64).map(|k| Aabb::of(&[DVec3::X * if k % 2 == 0 { f64::MAX } else { f64::MIN }])).collect();
+        let tree = AabbTree::build(&far, 1);
+        assert_eq!(depth(&tree, tree.root(), &far), 6);
+    }
+
+    #[test]
+    fn boxes_follow_items_that_move() {
+        let (before, after) = (points(100), points(100).iter().map(|p| *p * 3.0 - 1.0).collect::<Vec<_>>());
+        let boxes = |items: &[DVec3]| items.iter().map(|&p| Aabb::of(&[p])).collect::<Vec<_>>();
+        let (mut tree, moved) = (AabbTree::build(&boxes(&before), 2), boxes(&after));
+        for changed in [true, false] {
+            for slot in (0..2 * tree.nodes().len() as u32).rev() {
+                assert_eq!(tree.refit(slot, |i| moved[i as usize]), changed, "{slot}");
+            }
+            tree.refit_root(|i| moved[i as usize]);
+            depth(&tree, tree.root(), &moved);
+        }
     }
 }

@@ -43,3 +43,55 @@ pub fn convex_hull(mut points: Vec<(DVec2, usize)>, level: f64) -> Vec<(DVec2, u
     }
     hull
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+        (b - a).perp_dot(c - a)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn hulls_hold_all_points_and_turn_left(points in prop::collection::vec([-3i32..4, -3..4], 0..12)) {
+            let points: Vec<DVec2> = points.iter().map(|p| DVec2::from_array(p.map(f64::from))).collect();
+            let hull = convex_hull(points.iter().copied().zip(0..).collect(), 0.0);
+            for &(p, i) in &hull {
+                // Of points that coincide the first stays.
+                prop_assert_eq!(points.iter().position(|&q| q == p), Some(i));
+            }
+            let n = hull.len();
+            let in_line = points.iter().all(|&p| turn(hull[0].0, hull[n - 1].0, p) == 0.0);
+            prop_assert_eq!(n < 3, points.is_empty() || in_line);
+            for k in 0..if n < 3 { 0 } else { n } {
+                let (a, b, c) = (hull[k].0, hull[(k + 1) % n].0, hull[(k + 2) % n].0);
+                prop_assert!(turn(a, b, c) > 0.0);
+                prop_assert!(points.iter().all(|&p| turn(a, b, p) >= 0.0));
+            }
+            for &p in points.iter().filter(|_| n == 2) {
+                let (a, b) = (hull[0].0, hull[1].0);
+                prop_assert!((p - a).dot(p - b) <= 0.0, "{p} is beyond {a} or {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn corners_below_the_level_are_left_out() {
+        let numbers = |points: &[[f64; 2]], level| -> Vec<usize> {
+            let points = points.iter().map(|&p| DVec2::from_array(p)).zip(0..).collect();
+            convex_hull(points, level).iter().map(|&(_, i)| i).collect()
+        };
+        // The third point stands out of the square by 1e-3, of an extent of √32.
+        let square = [[0.0, 0.0], [4.0, 0.0], [4.0 + 1e-3, 2.0], [4.0, 4.0], [0.0, 4.0]];
+        assert_eq!(numbers(&square, 1e-4), [0, 1, 2, 3, 4]);
+        assert_eq!(numbers(&square, 1e-3 / 32f64.sqrt() * 1.01), [0, 1, 3, 4]);
+        // Of two corners beside each other one stays.
+        let beside = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [3.9995, 4.0005], [0.0, 4.0]];
+        assert_eq!(numbers(&beside, 1e-3), [0, 1, 3, 4]);
+        // Two points stay of a flat cloud.
+        assert_eq!(numbers(&[[0.0, 0.0], [1.0, 1e-6], [2.0, -1e-6], [3.0, 0.0]], 1e-3), [0, 3]);
+    }
+}

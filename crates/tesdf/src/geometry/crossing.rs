@@ -94,3 +94,23 @@ fn first_nonzero(signs: [i32; 3]) -> i32 {
 fn sign(value: f64) -> i32 {
     i32::from(value > 0.0) - i32::from(value < 0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::exact;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        // A coarse lattice, so that segments often meet edges, corners and planes.
+        [-2i32..3, -2..3, -2..3].prop_map(|p| DVec3::from_array(p.map(f64::from)))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn crossings_are_those_of_a_point_moved_by_a_little(x in point(), p in point(), t in [point(), point(), point()]) {
+            prop_assert_eq!(signed_crossing(x, p, t), exact::crossing(x, p, t));
+        }
+    }
+}

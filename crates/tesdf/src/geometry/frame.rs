@@ -83,4 +83,24 @@ mod tests {
             assert!((0.5..1.0).contains(&diagonal), "{diagonal}");
         }
     }
+
+    /// An axis is offset where its interval has one sign and the far end is at most twice the near one.
+    #[test]
+    fn the_offset_is_the_middle_of_an_interval_away_from_zero() {
+        for (low, high, middle) in
+            [(1.0, 2.0, 1.5), (1.0, 2.25, 0.0), (0.0, 1.0, 0.0), (-1.0, 1.0, 0.0), (3.0, 5.0, 4.0)]
+        {
+            let bounds = Aabb { min: DVec3::new(low, -high, 0.0), max: DVec3::new(high, -low, 1.0) };
+            let frame = LocalFrame::of(bounds);
+            assert_eq!(frame.offset, DVec3::new(middle, -middle, 0.0), "{low} {high}");
+            assert_eq!(frame.inverse_scale() * frame.scale, 1.0);
+            let moved = DVec3::new(low, -low, 0.5);
+            assert_eq!(frame.to_local(moved), (moved - frame.offset) * frame.scale);
+        }
+        assert_eq!(
+            [0.5, 0.75, 1.0, 3.0, 1e-300, 1e300].map(frexp).map(|(m, e)| m * elementary::powi(2.0, e)),
+            [0.5, 0.75, 1.0, 3.0, 1e-300, 1e300]
+        );
+        assert_eq!([0.5, 0.75, 1.0, 3.0].map(frexp), [(0.5, 0), (0.75, 0), (0.5, 1), (0.75, 2)]);
+    }
 }

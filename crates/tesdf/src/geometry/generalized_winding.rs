@@ -444,4 +444,21 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn nothing_is_certain_on_an_open_edge() {
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let winding = GeneralizedWinding::new(&[[0, 1, 2]], |v| vertices[v as usize]);
+        assert_eq!(winding.at(DVec3::NAN), Generalized { value: 0.0, error: 0.0 });
+        for x in vertices {
+            assert_eq!(winding.at(x).error, f64::INFINITY, "{x}");
+        }
+        let beside = DVec3::new(0.5, -0.1, 0.0);
+        assert!(winding.near(beside, 0.09).is_some() && winding.near(beside, 0.11).is_none());
+        assert_eq!(
+            (winding.side_within(beside, 0.02), winding.side_within(beside, 0.11)),
+            (Some(false), None)
+        );
+        assert_eq!(winding.near(DVec3::new(0.5, -1e-200, 0.0), 0.0), None, "its gradient is infinite");
+    }
 }

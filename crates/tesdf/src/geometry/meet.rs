@@ -123,6 +123,19 @@ mod tests {
             .unwrap_or(a)
     }
 
+    #[test]
+    fn segments_in_line_with_an_edge_meet_where_they_reach_it() {
+        let t = [[0, 0, 0], [2, 0, 0], [0, 2, 0]].map(point);
+        for (from, to, meets) in [(3, 4, false), (-2, -1, false), (-1, 3, true), (2, 3, true), (-1, 0, true)]
+        {
+            assert_eq!(
+                segment_meets_triangle(point([from, 0, 0]), point([to, 0, 0]), t),
+                meets,
+                "{from} {to}"
+            );
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(600))]
         #[test]

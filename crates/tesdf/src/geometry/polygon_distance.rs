@@ -227,4 +227,37 @@ mod tests {
         assert!(distance(&points[..2], DVec3::ZERO) < 1e-16);
         assert_eq!(distance(&points[..1], DVec3::ZERO), 1.0);
     }
+
+    /// A polygon of any number of corners is as near as the nearest of the triangles that it consists of.
+    #[test]
+    fn polygons_are_as_near_as_their_triangles() {
+        let lattice =
+            |k: u32| DVec3::new(f64::from(k % 5), f64::from(k / 5 % 5), f64::from(k / 25 % 5)) - 2.0;
+        for n in [3, 4, 12, 13, 40] {
+            let corner = |k: usize| (k as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+            let points: Vec<DVec3> = (0..n).map(corner).map(|(s, c)| DVec3::new(c, s, 0.0)).collect();
+            for k in 0..1500 {
+                // Among them segments and points, and edges parallel to those of the polygon.
+                let t = Triangle::new([lattice(k), lattice(k * 7 / 3), lattice(k * 5 / 2 + 3)]);
+                let distance = |points: &[DVec3]| {
+                    let (distance, at) = polygon_to_triangle(points, DVec3::Z, &t, f64::INFINITY).unwrap();
+                    assert!((t.closest(at).distance - distance).abs() < 1e-14);
+                    distance
+                };
+                let parts = (1..n - 1).map(|i| distance(&[points[0], points[i], points[i + 1]]));
+                let least = parts.fold(f64::INFINITY, f64::min);
+                assert!((distance(&points) - least).abs() < 1e-14, "{n} {k}");
+                let reversed: Vec<DVec3> = points.iter().rev().copied().collect();
+                assert!((distance(&reversed) - least).abs() < 1e-14, "{n} {k}");
+            }
+        }
+        let t = Triangle::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
+        let (p, far) = (DVec3::new(0.5, -1.0, 0.0), DVec3::new(9.0, -1.0, 0.0));
+        let of_segment = |p, q| polygon_to_triangle(&[p, q], DVec3::ZERO, &t, 9.0).unwrap().0;
+        assert_eq!(
+            (of_segment(p, p), of_segment(p, far)),
+            (1.0, 1.0),
+            "a point, and a segment beside an edge"
+        );
+    }
 }

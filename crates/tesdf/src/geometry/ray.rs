@@ -93,6 +93,8 @@ fn power_of_two_below(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::strategy::point;
+    use proptest::prelude::*;
 
     #[test]
     fn power_of_two_below_is_the_largest() {
@@ -124,5 +126,45 @@ mod tests {
         let ray = NearRay::new(origin, direction, DVec3::ZERO, 1.0).unwrap();
         assert_eq!((ray.origin, ray.skipped, ray.direction * ray.unit), (origin, 0.0, direction));
         assert_eq!(ray.total(ray.rest_of(0.7)), Some(0.7));
+    }
+
+    proptest! {
+        /// The ray passes the body at `beside` from the middle, and begins far before.
+        #[test]
+        fn rays_are_moved_along_themselves(
+            direction in point(), side in point(), beside in 0.0..3.0f64, power in 0i32..12, unit in -100i32..100
+        ) {
+            prop_assume!(direction.length() > 0.1 && side.cross(direction).length() > 0.01);
+            let (middle, size) = (DVec3::new(3.0, -7.0, 2.0), 0.5);
+            let across = side.cross(direction).normalize();
+            let (far, scale) = (10f64.powi(power), 10f64.powi(unit));
+            let origin = middle + size * beside * across - far * direction;
+            let ray = NearRay::new(origin, direction * scale, middle, size);
+            let Some(ray) = ray else { return Err(TestCaseError::fail("never near")) };
+            let rounding = 1e-15 * (far + 10.0);
+            prop_assert!((ray.origin - middle).abs().max_element() <= NEAR * size);
+            prop_assert!((1.0..4.0).contains(&ray.direction.length()));
+            for t in [0.0, 1.0, 7.0] {
+                // As a multiple of the original direction.
+                let total = ray.total(t).unwrap() * scale;
+                let (p, q) = (ray.origin + t * ray.direction, origin + total * direction);
+                prop_assert!(p.distance(q) <= 16.0 * rounding, "{} {}", p, q);
+                prop_assert!((ray.rest_of(ray.total(t).unwrap()) - t).abs() <= 64.0 * rounding);
+            }
+            // Behind the start, and at a greater distance, the ray misses the body.
+            let away = 100.0 + far;
+            prop_assert_eq!(NearRay::new(middle + away * direction, direction * scale, middle, size), None);
+            let aside = middle + 10.0 * size * across - away * direction;
+            prop_assert_eq!(NearRay::new(aside, direction * scale, middle, size), None);
+        }
+    }
+
+    #[test]
+    fn lengths_are_bounded_by_the_largest_number() {
+        let (length, direction) = length_and_direction(DVec3::new(3e300, 0.0, -4e300));
+        assert!(length == 5e300 && direction.distance(DVec3::new(0.6, 0.0, -0.8)) < 1e-15);
+        assert_eq!(length_and_direction(DVec3::MAX), (f64::MAX, DVec3::ONE.normalize()));
+        let ray = NearRay::new(DVec3::ZERO, DVec3::X * 1e-300, DVec3::ZERO, 1.0).unwrap();
+        assert_eq!((ray.total(1e9), ray.total(1.0).is_some()), (None, true));
     }
 }

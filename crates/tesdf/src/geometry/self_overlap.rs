@@ -82,7 +82,14 @@ mod tests {
                 .flat_map(|i| (i + 1..n).map(move |j| (i, j)))
                 .filter(|&(i, j)| boxes[i as usize].overlaps(boxes[j as usize]))
                 .collect();
-            prop_assert_eq!(found, brute);
+            prop_assert_eq!(&found, &brute);
+            // The first pair breaks off.
+            let mut seen = 0;
+            let broken = self_overlaps(&AabbTree::build(&boxes, leaf), &boxes, |_, _| {
+                seen += 1;
+                ControlFlow::Break(())
+            });
+            prop_assert_eq!((broken.is_break(), seen), (!brute.is_empty(), brute.len().min(1)));
         }
     }
 }

@@ -71,3 +71,40 @@ impl SignRule {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vertex(k: u32) -> DVec3 {
+        [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z][k as usize]
+    }
+
+    const CLOSED: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [2, 0, 3], [1, 2, 3]];
+
+    #[test]
+    fn closed_meshes_have_one_side_around_a_point() {
+        let (inside, outside) = (DVec3::splat(0.1), DVec3::splat(0.5));
+        for (rule, inverted) in
+            [(InsideRule::Winding, false), (InsideRule::Nonzero, true), (InsideRule::Generalized, true)]
+        {
+            let rule = |faces: &[[u32; 3]]| SignRule::new(rule, faces, vertex);
+            let found = rule(&CLOSED);
+            assert_eq!((found.side(inside), found.side(outside)), (Side::Inside, Side::Outside));
+            assert_eq!(found.side_within(inside, 0.05), Some(Side::Inside));
+            assert_eq!(found.side_within(outside, 0.05), Some(Side::Outside));
+            assert!(!found.jumps() && found.jump().is_none());
+            assert_eq!(rule(&CLOSED.map(|[a, b, c]| [a, c, b])).is_inside(inside), inverted);
+        }
+    }
+
+    #[test]
+    fn open_meshes_have_a_side_where_it_is_certain() {
+        let open = SignRule::new(InsideRule::Generalized, &CLOSED[..3], vertex);
+        assert!(open.jumps() && open.jump().is_some());
+        assert_eq!(open.side(DVec3::splat(0.1)), Side::Inside);
+        assert_eq!(open.side_within(DVec3::splat(0.02), 1e-3), Some(Side::Inside));
+        assert_eq!(open.side_within(DVec3::splat(3.0), 0.1), Some(Side::Outside));
+        assert_eq!(open.side_within(DVec3::splat(0.3), 0.3), None);
+    }
+}

@@ -48,6 +48,7 @@ pub fn tetrahedron_volume(t: &[DVec3; 4]) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::strategy::point;
+    use crate::geometry::{Triangle, polygon_to_triangle, triangles_meet};
     use proptest::prelude::*;
 
     proptest! {
@@ -69,6 +70,45 @@ mod tests {
             // Far triangles must be rejected.
             let far = tri.map(|p| p + DVec3::splat(4.0));
             prop_assert!(!triangle_meets_tetrahedron(&far, &t, 0.1));
+        }
+
+        /// Bodies that share no point are apart along one of the axes.
+        #[test]
+        fn bodies_that_are_apart_do_not_meet(t in [point(), point(), point(), point()], tri in [point(), point(), point()]) {
+            let sides = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].map(|side| side.map(|k: usize| t[k]));
+            let volumes = |p: DVec3| sides.iter().map(|&[a, b, c]| tetrahedron_volume(&[a, b, c, p])).sum::<f64>();
+            let whole = tetrahedron_volume(&t);
+            prop_assume!(whole > 1e-3);
+            let within = volumes(tri[0]) <= whole * (1.0 + 1e-12);
+            let meets = within || sides.iter().any(|&side| triangles_meet(side, tri));
+            prop_assert_eq!(triangle_meets_tetrahedron(&tri, &t, 0.0), meets);
+            // The least distance of the triangle from a side is a pad with which they meet.
+            let triangle = Triangle::new(tri);
+            let apart = |side: &[DVec3; 3]| {
+                let normal = (side[1] - side[0]).cross(side[2] - side[0]).normalize();
+                polygon_to_triangle(side, normal, &triangle, f64::INFINITY).map_or(0.0, |(distance, _)| distance)
+            };
+            let distance = sides.iter().map(apart).fold(f64::INFINITY, f64::min);
+            prop_assert!(triangle_meets_tetrahedron(&tri, &t, distance * (1.0 + 1e-9)));
+        }
+    }
+
+    /// Two edges, a corner and a side, an edge and the triangle: the pad is their distance.
+    #[test]
+    fn the_pad_is_the_distance_of_features() {
+        let t = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        assert_eq!(tetrahedron_volume(&t), 1.0 / 6.0);
+        let v = DVec3::new;
+        let way = v(1.0, 1.0, 0.0).normalize();
+        let across =
+            |d: f64| [v(0.5, 0.5, 0.3) + d * way, v(0.5, 0.5, -0.4) + d * way, v(3.0, 3.0, 0.0) + d * way];
+        let beside = |d: f64| [v(0.2, 0.2, -d), v(3.0, 0.2, -2.0), v(0.2, 3.0, -2.0)];
+        let over = |d: f64| [v(-2.0, -2.0, 1.0 + d), v(3.0, -2.0, 1.0 + d), v(0.0, 3.0, 1.0 + d)];
+        for d in [1e-3, 0.1, 1.0] {
+            for triangle in [across(d), beside(d), over(d)] {
+                assert!(!triangle_meets_tetrahedron(&triangle, &t, 0.999 * d), "{d} {triangle:?}");
+                assert!(triangle_meets_tetrahedron(&triangle, &t, 1.001 * d), "{d} {triangle:?}");
+            }
         }
     }
 }

@@ -306,6 +306,7 @@ mod tests {
         let a = DVec3::new(0.5, -2.4999999999999997e-34, 0.0);
         let (b, c) = (DVec3::new(0.75, 1e-19, 5e-36), DVec3::new(-0.5, -0.25, -2.5e-19));
         assert_ne!(Triangle::new([a, b, c]).regions(DVec3::new(0.0, -0.15, -0.9)).0, 0);
+        assert_eq!(Triangle::new([a, b, b]).regions(DVec3::ONE), Regions::FACE, "of a face without area");
     }
 
     proptest! {

@@ -164,3 +164,105 @@ impl Segment {
         !(misses(1, 2) || misses(2, 0) || misses(0, 1))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::strategy::point;
+    use proptest::prelude::*;
+
+    /// Two cubes that overlap, one within the other, and one inverted: outward, edge and lowest corner.
+    fn cubes() -> Vec<[DVec3; 3]> {
+        let cube = |(low, edge, outward): (DVec3, f64, bool)| {
+            let corner =
+                move |k: usize| low + edge * DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
+            let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+            sides.into_iter().flat_map(move |[a, b, c, d]| {
+                [[a, b, c], [a, c, d]]
+                    .map(|t| if outward { t.map(corner) } else { [t[0], t[2], t[1]].map(corner) })
+            })
+        };
+        let all = [
+            (DVec3::ZERO, 4.0, true),
+            (DVec3::splat(2.0), 4.0, true),
+            (DVec3::ONE, 1.0, true),
+            (DVec3::X * 8.0, 2.0, false),
+        ];
+        all.into_iter().flat_map(cube).collect()
+    }
+
+    /// Points of a lattice with corners, edges and sides of the cubes, and outside.
+    #[test]
+    fn cubes_count_as_often_as_they_contain_a_point() {
+        let winding = WindingNumber::of_triangles(cubes());
+        let held = |p: DVec3, low: f64, edge: f64| {
+            i32::from(p.cmpge(DVec3::splat(low)).all() && p.cmplt(DVec3::splat(low + edge)).all())
+        };
+        for k in 0..24 * 16 * 16 {
+            let p = 0.5 * DVec3::new((k % 24) as f64, (k / 24 % 16) as f64, (k / 384) as f64) - 0.5;
+            // The point moves up by an infinitesimal step, so that the lower sides contain it.
+            let moved = held(p, 0.0, 4.0) + held(p, 2.0, 4.0) + held(p, 1.0, 1.0)
+                - held(p - DVec3::X * 8.0, 0.0, 2.0);
+            assert_eq!(winding.at_perturbed(p), moved, "{p}");
+            let inside = p + 0.13;
+            let expected = winding.at_perturbed(inside);
+            assert_eq!(winding.at(inside), expected, "{inside}");
+            assert_eq!(winding.crossings(inside, p), expected - moved, "{p}");
+        }
+        assert_eq!((winding.at(DVec3::NAN), winding.at_perturbed(DVec3::NAN)), (0, 0));
+    }
+
+    #[test]
+    fn the_far_point_is_beyond_the_nearest_side() {
+        for at in [0.0, -1e3, 1e17, -1e17] {
+            let moved = cubes().iter().map(|t| t.map(|c| c + at)).collect();
+            let winding = WindingNumber::of_triangles(moved);
+            let Aabb { min, max } = winding.bounds;
+            for axis in 0..3 {
+                for (side, beyond) in [(min, -10.0), (max, 10.0)] {
+                    let mut p = winding.bounds.center();
+                    p[axis] = side[axis];
+                    let far = winding.far_point(p);
+                    assert!(!winding.bounds.contains(far), "{at} {far}");
+                    assert_eq!((0..3).filter(|&k| far[k] != p[k]).count(), 1, "{at} {far}");
+                    // At 1e17, the cubes have no extent along two axes, and all sides are as near.
+                    assert!(at.abs() > 1e9 || far[axis] == side[axis] + beyond, "{at} {far}");
+                }
+            }
+        }
+    }
+
+    /// The part of a segment in a box, by clipping with each side: its length, or how far the segment misses.
+    fn clipped(x: DVec3, p: DVec3, b: Aabb) -> f64 {
+        let (mut first, mut last) = (0f64, 1f64);
+        for axis in 0..3 {
+            let along = p[axis] - x[axis];
+            if along == 0.0 {
+                if x[axis] < b.min[axis] || x[axis] > b.max[axis] {
+                    return -1.0;
+                }
+                continue;
+            }
+            let (s, t) = ((b.min[axis] - x[axis]) / along, (b.max[axis] - x[axis]) / along);
+            (first, last) = (first.max(s.min(t)), last.min(s.max(t)));
+        }
+        last - first
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn segments_meet_the_boxes_that_clip_them(x in point(), p in point(), flat in 0usize..4, corners in [point(), point()]) {
+            let mut p = p;
+            if flat < 3 {
+                p[flat] = x[flat];
+            }
+            let b = Aabb::of(&corners);
+            let length = clipped(x, p, b);
+            prop_assume!(length.abs() > 1e-9);
+            prop_assert_eq!(Segment::new(x, p).may_meet(b), length > 0.0, "{}", length);
+            let along = DVec3::new(p.x, x.y, x.z);
+            prop_assert_eq!(Segment::new(x, along).may_meet(b), clipped(x, along, b) >= 0.0);
+        }
+    }
+}

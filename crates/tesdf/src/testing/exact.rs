@@ -53,6 +53,24 @@ pub fn squared_distance(p: DVec3, corners: [DVec3; 3]) -> BigRational {
     (0..3).map(to_edge).min().unwrap_or(zero)
 }
 
+/// The change of the winding number on the way from `x` to `p + (e, e², e³)` through a triangle, from the
+/// point where the way crosses the plane. `e` is 2^-20, which is little beside small integers.
+pub fn crossing(x: DVec3, p: DVec3, corners: [DVec3; 3]) -> i32 {
+    let (x, p, corners, zero) = (point(x), point(p), corners.map(point), number(0.0));
+    let p: Point = std::array::from_fn(|k| &p[k] + number(2f64.powi(-20 * (k as i32 + 1))));
+    let edges: [Point; 3] = std::array::from_fn(|k| minus(&corners[(k + 1) % 3], &corners[k]));
+    let normal = cross(&edges[0], &edges[1]);
+    let height = |of: &Point| dot(&normal, &minus(of, &corners[0]));
+    let (start, end) = (height(&x), height(&p));
+    if &start * &end >= zero {
+        return 0;
+    }
+    let (share, way) = (&start / (&start - &end), minus(&p, &x));
+    let at: Point = std::array::from_fn(|k| &x[k] + &share * &way[k]);
+    let is_within = |k: usize| dot(&cross(&edges[k], &minus(&at, &corners[k])), &normal) > zero;
+    if (0..3).all(is_within) { if end > start { 1 } else { -1 } } else { 0 }
+}
+
 /// Whether `distance` is the square root of `squared` up to `tolerance`.
 pub fn is_root(distance: f64, squared: &BigRational, tolerance: f64) -> bool {
     if !(distance.is_finite() && distance >= 0.0) {
