@@ -7,7 +7,6 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 
-nightly=nightly-2026-10-30
 version=0.9.1
 if ! rustup component list --toolchain "$nightly" --installed 2>/dev/null | grep -q llvm-tools; then
     step "coverage" rustup toolchain install "$nightly" --profile minimal --component llvm-tools --no-self-update

@@ -6,7 +6,6 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 
-nightly=nightly-2026-10-30
 if ! rustup run "$nightly" cargo miri --version >/dev/null 2>&1; then
     step "Miri" rustup toolchain install "$nightly" --profile minimal --component miri,rust-src --no-self-update
 fi

@@ -18,6 +18,9 @@ fi
 # The feature that is off by default and that tests need.
 features="--features tesdf-cli/gpu"
 
+# The compiler of Miri and of coverage, which install it where it is missing.
+nightly=nightly-2026-10-30
+
 # Prints a command, then runs it. Where STEP_TIMES names a file, adds a line to it: the name of the
 # step, its seconds, and the seconds of all processors that it used.
 step() {

@@ -166,7 +166,8 @@ def work(name, cores, mesh, kinds, checked, budget, answer):
         answer.send(why(e))
 
 
-def measure(*arguments, limit):
+def measure(work, *arguments, limit):
+    """what `work` of these arguments answers in a process of its own, or why it does not"""
     context = multiprocessing.get_context("spawn")
     receive, send = context.Pipe(duplex=False)
     child = context.Process(target=work, args=(*arguments, send))
@@ -195,12 +196,17 @@ def kinds_of_points(vertices, faces, count):
     return on + offset * normal[face] / area[face, None], random.uniform(low, high, (count, 3))
 
 
+def judged(distances, truth, diagonal):
+    """the errors of unsigned distances relative to the diagonal, and for each whether its sign is wrong"""
+    wrong = (np.signbit(distances) != np.signbit(truth)) & (np.abs(truth) > SIGN_FROM * diagonal)
+    return np.abs(np.abs(distances) - np.abs(truth)) / diagonal, wrong
+
+
 def errors(distances, truth, diagonal):
     """the largest error of an unsigned distance relative to the diagonal, and the number of wrong
     signs"""
-    worst = np.abs(np.abs(distances) - np.abs(truth)).max() / diagonal
-    wrong = (np.signbit(distances) != np.signbit(truth)) & (np.abs(truth) > SIGN_FROM * diagonal)
-    return "NaN" if np.isnan(worst) else f"{worst:.1e}", str(wrong.sum())
+    off, wrong = judged(distances, truth, diagonal)
+    return "NaN" if np.isnan(off).any() else f"{off.max():.1e}", str(wrong.sum())
 
 
 def main():
@@ -234,7 +240,7 @@ def main():
         first = None
         for name, _, _, gives, _, _ in CONTENDERS:
             found = [
-                measure(name, cores, (vertices, faces, file), kinds, args.checked, args.budget, limit=args.limit)
+                measure(work, name, cores, (vertices, faces, file), kinds, args.checked, args.budget, limit=args.limit)
                 for cores in runs.values()
             ]
             one = found[0]

@@ -21,7 +21,6 @@ runs in its own process for each set; one that fails for a mesh is counted under
 import argparse
 import atexit
 import csv
-import multiprocessing
 import shutil
 import sys
 import tempfile
@@ -30,7 +29,7 @@ from importlib.metadata import version
 import numpy as np
 import tesdf
 from measured import ROOT, SCALE, head, heading, row, why
-from peers_distance import CONTENDERS, SIGN_FROM
+from peers_distance import CONTENDERS, judged, measure
 
 from make_reference import sdf  # of data, which `measured` adds to the path
 from meshtools import drop_bad, read_mesh, weld
@@ -114,14 +113,6 @@ SETS = {"references": references, "tetrahedra": tetrahedra, "fins": fins, "damag
 
 
 # ------------------------------------------------------------------ measuring
-def judged(distances, truth, diagonal):
-    """the largest error relative to the diagonal, and for each point whether the sign is wrong"""
-    is_wrong = (distances < 0) != (truth < 0)
-    is_wrong = (is_wrong & (np.abs(truth) > SIGN_FROM * diagonal)) | np.isnan(distances)
-    errors = np.abs(np.abs(distances) - np.abs(truth)) / diagonal
-    return np.nanmax(errors, initial=0.0), is_wrong
-
-
 def encoded(which, cases, folder):
     """the files of tesdf"""
     for k, (vertices, faces, *_) in enumerate(cases):
@@ -145,8 +136,10 @@ def work(name, cases, files, answer):
             refused += 1
             print(f"{name}, {k}: {why(error)}", flush=True, file=sys.stderr)
             continue
-        error, is_wrong = judged(distances, truth, np.linalg.norm(np.ptp(vertices, axis=0)))
-        points, wrong, worst = points + len(at), wrong + int(is_wrong.sum()), max(worst, error)
+        off, is_wrong = judged(distances, truth, np.linalg.norm(np.ptp(vertices, axis=0)))
+        is_wrong |= np.isnan(distances)
+        points, wrong = points + len(at), wrong + int(is_wrong.sum())
+        worst = max(worst, np.nanmax(off, initial=0.0))
     answer.send((points, wrong, worst, refused))
 
 
@@ -163,18 +156,7 @@ def main():
         cases = list(SETS[which](np.random.default_rng(1)))
         files = list(encoded(which, cases, folder))
         for name, *_ in CONTENDERS:
-            context = multiprocessing.get_context("spawn")
-            receive, send = context.Pipe(duplex=False)
-            child = context.Process(target=work, args=(name, cases, files, send))
-            child.start()
-            send.close()
-            try:
-                found = receive.recv() if receive.poll(args.limit) else why(f"takes more than {args.limit:g} s")
-            except EOFError:
-                child.join()
-                found = why(f"its process ended with {child.exitcode}")
-            child.kill()
-            child.join()
+            found = measure(work, name, cases, files, limit=args.limit)
             if isinstance(found, str):
                 row([which, str(len(cases)), name, found, "", "", ""])
                 continue

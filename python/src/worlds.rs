@@ -466,8 +466,8 @@ impl Worlds {
         PyArray1::from_vec(py, self.read(py, |worlds| worlds.iter().map(World::steps).collect()))
     }
 
-    /// Numbers of steps [n] since the beginning or the last reset that did not converge: contacts or
-    /// joints contradict each other there, or the time step is too long.
+    /// Numbers of steps [n] since the beginning or the last reset that did not converge: contacts
+    /// or joints contradict each other there, or the time step is too long.
     #[getter]
     fn unconverged_steps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
         let of_worlds = self.read(py, |worlds| worlds.iter().map(World::unconverged_steps).collect());
@@ -546,8 +546,8 @@ impl Worlds {
         forces::of_contacts(py, &found.unwrap_or_default())
     }
 
-    /// What the steps of a world since its beginning did not do as its scene asks, in lines for users,
-    /// as in Simulation.warnings. Overlaps are those of now, and are measured for this.
+    /// What the steps of a world since its beginning did not do as its scene asks, in lines for
+    /// users, as in Simulation.warnings. Overlaps are those of now, and are measured for this.
     fn warnings(&self, py: Python<'_>, world: usize) -> PyResult<Vec<String>> {
         let world = self.one(py, world)?;
         let warnings = self.read(py, |worlds| worlds[world].warnings());

@@ -1058,8 +1058,8 @@ class Worlds:
     def contact_forces(self, world: int) -> ContactForces:
         """The forces of the contacts of a world that push: ContactForces."""
     def warnings(self, world: int) -> list[str]:
-        """What the steps of a world since its beginning did not do as its scene asks, in lines for users,
-        as in Simulation.warnings. Overlaps are those of now, and are measured for this."""
+        """What the steps of a world since its beginning did not do as its scene asks, in lines for
+        users, as in Simulation.warnings. Overlaps are those of now, and are measured for this."""
     def contacts(self, world: int) -> StepContacts:
         """The contacts of a world at the beginning of the last step: StepContacts."""
     @property
@@ -1079,8 +1079,8 @@ class Worlds:
         """Numbers of steps [n] since the beginning or the last reset."""
     @property
     def unconverged_steps(self) -> npt.NDArray[np.uint64]:
-        """Numbers of steps [n] since the beginning or the last reset that did not converge: contacts or
-        joints contradict each other there, or the time step is too long."""
+        """Numbers of steps [n] since the beginning or the last reset that did not converge: contacts
+        or joints contradict each other there, or the time step is too long."""
     @property
     def poses(self) -> npt.NDArray[np.float64]:
         """Current poses [n, B, 7] of the bodies' frames, x y z qx qy qz qw."""

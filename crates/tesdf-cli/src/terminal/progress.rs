@@ -49,8 +49,8 @@ impl Drop for Bar {
     }
 }
 
-/// Runs `work` while another thread draws its progress and passes Ctrl-C on to it. Where that thread
-/// cannot be started, nothing is drawn, and Ctrl-C ends the process after a second.
+/// Runs `work` while another thread draws its progress and passes Ctrl-C on to it. Where that
+/// thread cannot be started, nothing is drawn, and Ctrl-C ends the process after a second.
 pub fn watched<T>(progress: &Progress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {

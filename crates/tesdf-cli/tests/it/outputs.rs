@@ -13,7 +13,8 @@ use tesdf_sim::RunRecord;
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
 f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-const SCENE: &str = r#"
+/// A cube over another one, which is encoded.
+pub const SCENE: &str = r#"
 time_step = 2e-3
 duration = 0.02
 

@@ -1,5 +1,5 @@
-//! Files of each version of runs and journals, written once. They must continue to open and hold the
-//! same values. `TESDF_WRITE_GOLDEN=1` writes them.
+//! Files of each version of runs and journals, written once. They must continue to open and hold
+//! the same values. `TESDF_WRITE_GOLDEN=1` writes them.
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -308,8 +308,8 @@ mod tests {
         }
     }
 
-    /// Points that halve their distance from a corner again and again: a split by cost leaves most of
-    /// them on one side. And points so far apart that their distance is not a number.
+    /// Points that halve their distance from a corner again and again: a split by cost leaves most
+    /// of them on one side. And points so far apart that their distance is not a number.
     #[test]
     fn points_of_all_sizes_do_not_make_a_deep_tree() {
         let along = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 0.5)];

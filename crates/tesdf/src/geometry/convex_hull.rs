@@ -2,8 +2,8 @@
 use glam::DVec2;
 
 /// The corners of the convex hull of points with their numbers, anticlockwise (Andrew's monotone
-/// chain). A corner that rounding makes of a point on a side, or beside another corner, is left out:
-/// one that stands out by at most `level` of the extent.
+/// chain). A corner that rounding makes of a point on a side, or beside another corner, is left
+/// out: one that stands out by at most `level` of the extent.
 pub fn convex_hull(mut points: Vec<(DVec2, usize)>, level: f64) -> Vec<(DVec2, usize)> {
     points.sort_by(|(p, i), (q, j)| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(i.cmp(j)));
     points.dedup_by(|later, first| later.0 == first.0);

@@ -84,7 +84,8 @@ mod tests {
         }
     }
 
-    /// An axis is offset where its interval has one sign and the far end is at most twice the near one.
+    /// An axis is offset where its interval has one sign and the far end is at most twice the near
+    /// one.
     #[test]
     fn the_offset_is_the_middle_of_an_interval_away_from_zero() {
         for (low, high, middle) in

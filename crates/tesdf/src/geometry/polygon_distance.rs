@@ -228,7 +228,8 @@ mod tests {
         assert_eq!(distance(&points[..1], DVec3::ZERO), 1.0);
     }
 
-    /// A polygon of any number of corners is as near as the nearest of the triangles that it consists of.
+    /// A polygon of any number of corners is as near as the nearest of the triangles that it
+    /// consists of.
     #[test]
     fn polygons_are_as_near_as_their_triangles() {
         let lattice =

@@ -171,7 +171,8 @@ mod tests {
     use crate::geometry::strategy::point;
     use proptest::prelude::*;
 
-    /// Two cubes that overlap, one within the other, and one inverted: outward, edge and lowest corner.
+    /// Two cubes that overlap, one within the other, and one inverted: outward, edge and lowest
+    /// corner.
     fn cubes() -> Vec<[DVec3; 3]> {
         let cube = |(low, edge, outward): (DVec3, f64, bool)| {
             let corner =
@@ -232,7 +233,8 @@ mod tests {
         }
     }
 
-    /// The part of a segment in a box, by clipping with each side: its length, or how far the segment misses.
+    /// The part of a segment in a box, by clipping with each side: its length, or how far the
+    /// segment misses.
     fn clipped(x: DVec3, p: DVec3, b: Aabb) -> f64 {
         let (mut first, mut last) = (0f64, 1f64);
         for axis in 0..3 {

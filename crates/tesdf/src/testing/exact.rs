@@ -53,8 +53,9 @@ pub fn squared_distance(p: DVec3, corners: [DVec3; 3]) -> BigRational {
     (0..3).map(to_edge).min().unwrap_or(zero)
 }
 
-/// The change of the winding number on the way from `x` to `p + (e, e², e³)` through a triangle, from the
-/// point where the way crosses the plane. `e` is 2^-20, which is little beside small integers.
+/// The change of the winding number on the way from `x` to `p + (e, e², e³)` through a triangle,
+/// from the point where the way crosses the plane. `e` is 2^-20, which is little beside small
+/// integers.
 pub fn crossing(x: DVec3, p: DVec3, corners: [DVec3; 3]) -> i32 {
     let (x, p, corners, zero) = (point(x), point(p), corners.map(point), number(0.0));
     let p: Point = std::array::from_fn(|k| &p[k] + number(2f64.powi(-20 * (k as i32 + 1))));

@@ -114,16 +114,17 @@ impl Bench {
         ended
     }
 
-    /// The files of the folder, but those of unfinished writes, and whether there are some of these.
+    /// The files of the folder, but those of unfinished writes, and whether there are some of
+    /// these.
     fn names(&self) -> (Vec<String>, bool) {
         let (parts, names): (Vec<_>, Vec<_>) =
             self.folder.names().into_iter().partition(|name| name.starts_with(".tesdf-"));
         (names, !parts.is_empty())
     }
 
-    /// Lets calls of each kind fail, in a third of all places, which the day chooses: each once, and
-    /// that and all later ones. The result is the whole new file, or an error, with the old file
-    /// or, for a run, with its steps so far.
+    /// Lets calls of each kind fail, in a third of all places, which the day chooses: each once,
+    /// and that and all later ones. The result is the whole new file, or an error, with the old
+    /// file or, for a run, with its steps so far.
     pub fn try_files(&self, writer: Writer, kinds: &[&str]) {
         let whole = self.whole(writer);
         let mut hits = 0;

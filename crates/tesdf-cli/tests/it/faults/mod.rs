@@ -11,27 +11,14 @@ mod bench;
 mod rotation;
 
 use crate::folder::{Folder, block, texts};
+use crate::outputs::SCENE;
 use bench::{Bench, MOST, Writer};
 use rotation::of_the_day;
 
-const SCENE: &str = r#"
-time_step = 2e-3
-duration = 0.02
-
-[record]
-contacts_every = 1
-
-[[bodies]]
-name = "floor"
-asset = "a.tesdf"
-fixed = true
-
-[[bodies]]
-name = "cube"
-mesh = "cube.obj"
-density = 1000
-translation = [0, 0, 1.001]
-"#;
+/// A scene whose run records contacts.
+fn scene() -> String {
+    format!("{SCENE}\n[record]\ncontacts_every = 1\n")
+}
 
 /// A tetrahedron, and another over one of its faces.
 const JSON: &str = r#"{
@@ -64,7 +51,7 @@ fn workplace() -> Bench {
     let bench = Bench::new();
     let folder = &bench.folder;
     folder.write("cube.obj", block(1));
-    folder.write("scene.toml", SCENE);
+    folder.write("scene.toml", scene());
     folder.write("a.json", JSON);
     folder.good(&["encode", "cube.obj", "-o", "a.tesdf", "--preset", "fast"]);
     folder.good(&["import", "a.json", "-o", "json.tesdf"]);
@@ -243,7 +230,7 @@ fn a_clock_that_goes_back_changes_nothing() {
     // A run, whose steps are timed.
     bench.folder.write(
         "scene.toml",
-        SCENE.replace("asset = \"a.tesdf\"", "mesh = \"meshes/b.obj\"").replace("cube.obj", "meshes/a.obj"),
+        scene().replace("asset = \"a.tesdf\"", "mesh = \"meshes/b.obj\"").replace("cube.obj", "meshes/a.obj"),
     );
     let whole = bench.whole(SIMULATE);
     for number in of_the_day(1..20) {
@@ -311,7 +298,7 @@ fn two_writers_leave_one_whole_file() {
     commands(["encode", "a.obj", "-o", "f.tesdf"], ["encode", "b.obj", "-o", "f.tesdf"]);
     folder.write("cube.obj", block(1));
     folder.good(&["encode", "cube.obj", "-o", "a.tesdf", "--preset", "fast"]);
-    folder.write("scene.toml", SCENE);
-    folder.write("long.toml", SCENE.replace("duration = 0.02", "duration = 0.1"));
+    folder.write("scene.toml", scene());
+    folder.write("long.toml", scene().replace("duration = 0.02", "duration = 0.1"));
     commands(["simulate", "scene.toml", "-o", "run"], ["simulate", "long.toml", "-o", "run"]);
 }
