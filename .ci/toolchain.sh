@@ -15,6 +15,12 @@ if [ "${OS:-}" != Windows_NT ] && ! command -v cc >/dev/null; then
     exit 2
 fi
 
+# Large pages for the heaps of the compiler (jemalloc) and of all other programs (glibc). On a virtual
+# machine whose host backs its memory by small pages, `cargo check -p tesdf` takes 9 s with them and 82 s
+# without (a dependent read from 64 MB: 0.19 and 1.7 µs).
+export MALLOC_CONF=${MALLOC_CONF:-thp:always}
+export GLIBC_TUNABLES=${GLIBC_TUNABLES:-glibc.malloc.hugetlb=1}
+
 # The feature that is off by default and that tests need.
 features="--features tesdf-cli/gpu"
 
