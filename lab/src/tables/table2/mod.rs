@@ -140,7 +140,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if scenarios.is_empty() {
         let folder = args.recordings.display();
         return Err(Failure::new(format!("{folder}: there are no recorded poses"))
-            .hint("give the folder `data/recordings` of the repository to --recordings"));
+            .hint("give the folder `lab/recordings` of the repository to --recordings"));
     }
     let files: Vec<PathBuf> = scenarios.iter().map(|&scenario| args.file(scenario)).collect();
     let sink = Sink::open(&args.output, "table2", &files)?;
