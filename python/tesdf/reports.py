@@ -502,8 +502,8 @@ class WhyReport:
     """the instance whose field is used"""
     pair: str
     """"tested"; or why it was not: "same_instance", "other_worlds", "groups_do_not_meet",
-    "excluded", "both_planes" or "bounds_apart". The rest is reported as if the pair was
-    tested"""
+    "excluded", "both_planes", "bounds_apart" or "of_other_order" (the faces of b have all
+    contacts of the plane a). The rest is reported as if the pair was tested"""
     contact_distance: float
     """that of the options plus what velocities add"""
     bounds_gap: float

@@ -57,6 +57,7 @@ fn text(r: &WhyReport, options: &CollideOptions) -> String {
         PairVerdict::GroupsDoNotMeet => "not tested: their groups do not meet".into(),
         PairVerdict::Excluded => "not tested: excluded".into(),
         PairVerdict::BothPlanes => "not tested: both are planes".into(),
+        PairVerdict::OfOtherOrder => "not searched: the faces of the other instance have all contacts".into(),
         PairVerdict::BoundsApart => format!("not tested: bounds are {:e} apart", r.bounds_gap),
     };
     let _ = writeln!(text, "  pair: {pair}; contact distance {:e}", r.contact_distance);

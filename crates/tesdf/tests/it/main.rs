@@ -49,6 +49,7 @@ mod mesh_split;
 mod mesh_write;
 mod negative_winding;
 mod normal_cones;
+mod plane_contacts;
 mod prove;
 mod query_by_tree;
 mod reduction;

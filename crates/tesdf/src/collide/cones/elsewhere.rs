@@ -34,6 +34,9 @@ pub fn in_cones(
             near = cones.near();
             let (of_order, others) = faces.split_at(order.len().min(faces.len()));
             faces = others;
+            if cones.are_of_other_order(options.contacts_per) {
+                continue;
+            }
             let of_order = order
                 .par_iter()
                 .zip(of_order)

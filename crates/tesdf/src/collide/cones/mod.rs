@@ -96,6 +96,19 @@ impl<'a> Cones<'a> {
         self.near + (8.0 * self.tolerance * distance.abs()).sqrt()
     }
 
+    /// Whether the faces of the first body are those of a plane, and the faces of the second have all
+    /// contacts that hold it. The height over the plane is linear over each face of the second body,
+    /// so it is lowest at vertices, which are contacts of their faces. Other contacts of the plane lie
+    /// between them, or inside the body and less deep.
+    pub fn are_of_other_order(&self, per: ContactsPer) -> bool {
+        let has_all = match *self.b.shape {
+            Shape::Box { .. } | Shape::Sphere { .. } | Shape::Capsule { .. } => true,
+            Shape::Mesh(ref asset) => asset.faces_enclose_the_solid() && asset.half_thickness == 0.0,
+            Shape::Plane | Shape::Cylinder { .. } => false,
+        };
+        per == ContactsPer::Minimum && matches!(self.a.shape, Shape::Plane) && has_all
+    }
+
     /// A contact of a face as a detection reports it, with the normal that the cones allow. `faces`
     /// are the indices of its faces in the shapes. Per local minimum, its distance is that along
     /// the normal, and `None` is a contact that there is not; others keep their points and

@@ -82,6 +82,9 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> CandidateContacts {
 impl CandidateContacts {
     /// Adds the contacts of more candidates.
     pub fn extend(&mut self, pair: &OrderedPair, candidates: &[u32]) {
+        if pair.is_of_other_order() {
+            return;
+        }
         if matches!(pair.field.field, Field::Simple(_)) {
             return candidates.iter().for_each(|&k| self.add(pair, k, &pair.part(k), None));
         }

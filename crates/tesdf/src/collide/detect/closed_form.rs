@@ -1,5 +1,5 @@
 //! Minima that have a closed form: of a point in the field of a simple shape, and of a part that is
-//! large, or flat, over a plane. They are those of the search, bit for bit.
+//! large, or flat, over a plane. They are those of the search, bit for bit. And parts that have none.
 use glam::DVec3;
 
 use crate::collide::bodies::surface::{Part, PartFacing};
@@ -7,6 +7,10 @@ use crate::collide::mode::Mode;
 use crate::collide::narrow::extremes::{OPPOSES, is_level};
 use crate::collide::narrow::{Minimum, Search};
 use crate::collide::scene::simple::Simple;
+use crate::geometry::Aabb;
+
+/// Lengths that differ by less than this part of the largest number may be equal.
+const CLEAR: f64 = 1e-12;
 
 /// Finds the minima of a part that are within the reach of `search`, as [`Search::minima`] does.
 /// Returns whether there is a closed form; if not, nothing is found.
@@ -18,6 +22,9 @@ pub fn minima(
     found: &mut impl FnMut(Minimum),
 ) -> bool {
     let reach = search.reach + part.radius;
+    if !matches!(simple, Simple::Plane) && is_beyond(simple, part, reach) {
+        return true;
+    }
     match (part.points(), simple) {
         (&[point], _) => {
             let minimum = at(simple, part, point, true);
@@ -31,6 +38,21 @@ pub fn minima(
         }
         _ => false,
     }
+}
+
+/// Whether the box around a simple shape shows that no point of the part is within reach: the boxes of
+/// both are apart, or the shape lies in front of the plane of the part. So most faces of two boxes that
+/// touch need no search.
+fn is_beyond(simple: Simple, part: &Part, reach: f64) -> bool {
+    let (own, bounds) = (Aabb::of(part.points()), simple.bounds());
+    let size = own.max.max(-own.min).max(bounds.max).max_element();
+    let clear = reach.max(0.0) + CLEAR * size;
+    let gap = (own.min - bounds.max).max(bounds.min - own.max).max(DVec3::ZERO);
+    if gap.length_squared() > clear * clear {
+        return true;
+    }
+    let lowest = -part.normal.abs().dot(bounds.max);
+    lowest - part.normal.dot(part.points()[0]) > clear
 }
 
 /// The minima over the plane z = 0 of a large segment or triangle, or of a small triangle whose corners

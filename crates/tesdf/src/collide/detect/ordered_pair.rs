@@ -128,6 +128,12 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
+    /// Whether the contacts of the other order are all.
+    pub fn is_of_other_order(&self) -> bool {
+        let (cones, per) = (self.cones.as_ref(), self.options.mode.contacts_per());
+        cones.zip(per).is_some_and(|(cones, per)| cones.are_of_other_order(per))
+    }
+
     /// The search for minima of some parts, up to the greatest of their own contact distances.
     pub fn search_of<'p>(&self, parts: impl IntoIterator<Item = &'p Part>) -> Search {
         let reach = parts.into_iter().map(|part| self.reach.of(part.points(), part.radius));

@@ -31,6 +31,8 @@ pub enum PairVerdict {
     BothPlanes,
     /// Their bounds are farther apart than the contact distance.
     BoundsApart,
+    /// The faces are those of a plane, and the faces of *b* have its contacts.
+    OfOtherOrder,
 }
 
 /// The result of the broad phase for a face or node. Bounds are in the world's unit.
@@ -189,6 +191,9 @@ pub fn why(
         return Ok(report);
     }
     let stages = Stages { pair: OrderedPair::new(scene, options, a, b, contact_distance)?, options };
+    if report.pair == PairVerdict::Tested && stages.pair.is_of_other_order() {
+        report.pair = PairVerdict::OfOtherOrder;
+    }
     let candidates = stages.pair.candidates();
     let wanted = match part {
         None => candidates.clone(),
