@@ -503,7 +503,8 @@ class WhyReport:
     pair: str
     """"tested"; or why it was not: "same_instance", "other_worlds", "groups_do_not_meet",
     "excluded", "both_planes", "bounds_apart" or "of_other_order" (the faces of b have all
-    contacts of the plane a). The rest is reported as if the pair was tested"""
+    contacts: a is a plane, or a convex body and b a ball). The rest is reported as if the
+    pair was tested"""
     contact_distance: float
     """that of the options plus what velocities add"""
     bounds_gap: float

@@ -11,6 +11,7 @@ mod contacts_brute_force;
 mod contacts_exact;
 mod contacts_hidden;
 mod contacts_none_lost;
+mod contacts_of_one_order;
 mod contacts_per_face;
 mod contacts_spread;
 mod container;
@@ -49,7 +50,7 @@ mod mesh_split;
 mod mesh_write;
 mod negative_winding;
 mod normal_cones;
-mod plane_contacts;
+
 mod prove;
 mod query_by_tree;
 mod reduction;

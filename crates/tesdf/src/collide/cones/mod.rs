@@ -96,17 +96,19 @@ impl<'a> Cones<'a> {
         self.near + (8.0 * self.tolerance * distance.abs()).sqrt()
     }
 
-    /// Whether the faces of the first body are those of a plane, and the faces of the second have all
-    /// contacts that hold it. The height over the plane is linear over each face of the second body,
-    /// so it is lowest at vertices, which are contacts of their faces. Other contacts of the plane lie
-    /// between them, or inside the body and less deep.
+    /// Whether the faces of the second body have all contacts per local minimum that hold the first.
+    ///
+    /// *A plane*: its height is linear over each face of the other body, so it is lowest at vertices,
+    /// which are contacts of their faces. Other contacts of the plane lie between them, or inside the
+    /// body and less deep. *A ball* has one nearest point on a convex body, which its centre finds.
     pub fn are_of_other_order(&self, per: ContactsPer) -> bool {
-        let has_all = match *self.b.shape {
-            Shape::Box { .. } | Shape::Sphere { .. } | Shape::Capsule { .. } => true,
-            Shape::Mesh(ref asset) => asset.faces_enclose_the_solid() && asset.half_thickness == 0.0,
-            Shape::Plane | Shape::Cylinder { .. } => false,
+        let is_all = match (self.a.shape, self.b.shape) {
+            (Shape::Plane, Shape::Mesh(mesh)) => mesh.faces_enclose_the_solid() && mesh.half_thickness == 0.0,
+            (Shape::Plane, Shape::Box { .. } | Shape::Sphere { .. } | Shape::Capsule { .. }) => true,
+            (Shape::Box { .. } | Shape::Cylinder { .. }, Shape::Sphere { .. }) => true,
+            _ => false,
         };
-        per == ContactsPer::Minimum && matches!(self.a.shape, Shape::Plane) && has_all
+        per == ContactsPer::Minimum && is_all
     }
 
     /// A contact of a face as a detection reports it, with the normal that the cones allow. `faces`

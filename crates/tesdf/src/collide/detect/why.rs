@@ -31,7 +31,7 @@ pub enum PairVerdict {
     BothPlanes,
     /// Their bounds are farther apart than the contact distance.
     BoundsApart,
-    /// The faces are those of a plane, and the faces of *b* have its contacts.
+    /// The faces of *b* have all contacts: *a* is a plane, or a convex body and *b* a ball.
     OfOtherOrder,
 }
 

@@ -1,4 +1,4 @@
-//! Contacts of planes with other bodies: those of the body's faces hold it as those of the plane do.
+//! Pairs of which one order has all contacts: planes with other bodies, balls with convex bodies.
 
 use std::f64::consts::TAU;
 
@@ -101,4 +101,49 @@ fn faces_of_a_body_have_all_contacts_of_a_plane() {
         }
     }
     assert!(of_plane > 1000, "{of_plane} contacts of the plane");
+}
+
+/// Balls beside sides, edges and corners of boxes and cylinders, and in them up to their centre.
+#[test]
+fn the_centre_of_a_ball_has_its_contact_with_a_convex_body() {
+    let mut random = Random(7);
+    let (mut of_faces, mut cases) = (0, 0);
+    for case in 0..600 {
+        let convex = match case % 2 {
+            0 => Shape::Box { half_extents: DVec3::new(0.3, 0.2, 0.1) },
+            _ => Shape::Cylinder { half_height: 0.2, radius: 0.3 },
+        };
+        let radius = random.between(0.02, 0.5);
+        let mut scene = Scene::new();
+        let center = DVec3::new(0.5, 0.4, 0.4) * random.in_cube();
+        let world = Pose {
+            rotation: DQuat::from_axis_angle(random.direction(), random.between(0.0, 3.0)),
+            translation: random.direction(),
+        };
+        let [body, ball] = [(convex, world), (Shape::Sphere { radius }, world.after(Pose::at(center)))].map(
+            |(shape, pose)| {
+                let shape = scene.add_shape(shape).expect("a shape");
+                scene.add(Instance::new(shape, pose)).expect("a pose")
+            },
+        );
+        let options = CollideOptions {
+            contact_distance: 0.05,
+            ..CollideOptions::with_mode(Mode::exact().per(ContactsPer::Minimum))
+        };
+        let contacts = detect(&scene, &options).expect("contacts");
+        let distance =
+            clearance(&scene, body, ball, &ClearanceOptions::default()).expect("a clearance").distance;
+        assert_eq!(contacts.len(), usize::from(distance <= 0.05), "case {case}");
+        let report = why(&scene, &options, body, ball, None).expect("a report");
+        assert!(matches!(report.pair, PairVerdict::OfOtherOrder | PairVerdict::BoundsApart));
+        let Some(contact) = contacts.iter().next() else { continue };
+        assert!((contact.distance - distance).abs() < 1e-7, "case {case}: {contact:?}, clearance {distance}");
+        // The faces have it, too, and besides contacts that are higher, or less deep.
+        for found in report.parts.iter().flat_map(|part| &part.polygons) {
+            assert!(found.distance >= contact.distance - 1e-7, "case {case}: {found:?} {contact:?}");
+            of_faces += usize::from(found.verdict == PolygonVerdict::Contact);
+        }
+        cases += 1;
+    }
+    assert!(cases > 200 && of_faces > 100, "{cases} contacts, {of_faces} of faces");
 }
