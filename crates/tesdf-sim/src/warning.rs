@@ -315,7 +315,7 @@ fn not_converged(totals: &Totals, time_step: f64) -> Option<Warning> {
     let Totals { steps, unconverged, first_unconverged, residual: Residual { way, force }, .. } = *totals;
     let first = first_unconverged? as f64 * time_step;
     let message = format!(
-        "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: contacts and joints are off by {:.3e} µm \
+        "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: contacts, friction and joints are off by {:.3e} µm \
          and {force:.3e} N at most; shorten the time step",
         1e6 * way
     );

@@ -148,6 +148,8 @@ impl Interior<'_> {
         let mut found = self.iterate(guess);
         if !found.converged {
             found.residual = self.residual(&found.velocity, &found.forces);
+            let of_friction = self.friction_off(&found) / self.bodies.time_step;
+            found.residual.force = greater(of_friction, found.residual.force);
         }
         found
     }
@@ -271,21 +273,37 @@ impl Interior<'_> {
     /// the greater one of sliding and torsional friction.
     fn lag(&self, at: &Solution) -> f64 {
         let mut laws = [(0.0, f64::MIN_POSITIVE); 2];
+        self.visit_frictions(at, &mut |is_torsion, off, due| {
+            let (excess, all) = &mut laws[usize::from(is_torsion)];
+            *excess += off;
+            *all += due;
+        });
+        laws.into_iter().map(|(excess, all)| excess / all).fold(0.0, greater)
+    }
+
+    /// The greatest impulse by which friction differs from its law, N s; N m s of torsional friction.
+    fn friction_off(&self, at: &Solution) -> f64 {
+        let mut greatest = 0.0;
+        self.visit_frictions(at, &mut |_, off, _| greatest = greater(off, greatest));
+        greatest
+    }
+
+    /// Visits each friction: whether it is torsional, the impulse by which it differs from its law, and
+    /// its limit by the push.
+    fn visit_frictions(&self, at: &Solution, visit: &mut impl FnMut(bool, f64, f64)) {
         let limits = self.limits(&at.forces);
         for (((bundle, forces), due), limit) in
             self.lines.bundles.iter().zip(&at.forces).zip(&limits).zip(&at.limits)
         {
             let Some(slip) = &bundle.slip else { continue };
-            let (excess, all) = &mut laws[usize::from(slip.torsion.is_some())];
             for lane in 0..bundle.rows().len() {
                 let [due, limit, scale] = [due, limit, &slip.scale].map(|lanes| lanes.0[lane]);
                 let size = elementary::hypot(forces.friction[0].0[lane], forces.friction[1].0[lane]);
                 let slides = size > 0.999 * limit;
-                *excess += scale * if slides { (due - limit).abs() } else { (size - due).max(0.0) };
-                *all += scale * due;
+                let off = if slides { (due - limit).abs() } else { (size - due).max(0.0) };
+                visit(slip.torsion.is_some(), scale * off, scale * due);
             }
         }
-        laws.into_iter().map(|(excess, all)| excess / all).fold(0.0, greater)
     }
 
     /// The mean square of a gap of `gap` metres over all bounds, in the units of the rows.
