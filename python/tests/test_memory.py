@@ -49,8 +49,8 @@ def test_geometries_of_a_simulation_come_from_memory(cube, tmp_path):
     assert ends({"mesh": cube, **place}) == expected
     assert ends({"mesh": Mesh(*cube), **place}) == expected
     for shape, keys in [
-        (tesdf.Box((0.03, 0.03, 0.03)), {"box": {"half_extents": [0.03, 0.03, 0.03]}}),
-        (tesdf.Sphere(0.03), {"sphere": {"radius": 0.03}}),
+        (tesdf.Box((0.03, 0.03, 0.02)), {"box": {"half_extents": [0.03, 0.03, 0.02]}}),
+        (tesdf.Sphere(0.025), {"sphere": {"radius": 0.025}}),
         (tesdf.Capsule(0.01, 0.03), {"capsule": {"half_height": 0.01, "radius": 0.03}}),
         (tesdf.Cylinder(0.01, 0.03), {"cylinder": {"half_height": 0.01, "radius": 0.03}}),
     ]:
