@@ -113,8 +113,8 @@ pub struct StepReport {
 pub struct Residual {
     /// The greatest way of a contact, a joint or a point of a body in the step, m.
     pub way: f64,
-    /// The greatest force on a body, or by which friction differs from its law, N; of torsional friction
-    /// N m.
+    /// The greatest force on a body, or by which friction differs from its law, N; of torsional
+    /// friction N m.
     pub force: f64,
 }
 

@@ -147,9 +147,7 @@ impl Interior<'_> {
         }
         let mut found = self.iterate(guess);
         if !found.converged {
-            found.residual = self.residual(&found.velocity, &found.forces);
-            let of_friction = self.friction_off(&found) / self.bodies.time_step;
-            found.residual.force = greater(of_friction, found.residual.force);
+            found.residual = self.residual(&found);
         }
         found
     }
@@ -281,15 +279,8 @@ impl Interior<'_> {
         laws.into_iter().map(|(excess, all)| excess / all).fold(0.0, greater)
     }
 
-    /// The greatest impulse by which friction differs from its law, N s; N m s of torsional friction.
-    fn friction_off(&self, at: &Solution) -> f64 {
-        let mut greatest = 0.0;
-        self.visit_frictions(at, &mut |_, off, _| greatest = greater(off, greatest));
-        greatest
-    }
-
-    /// Visits each friction: whether it is torsional, the impulse by which it differs from its law, and
-    /// its limit by the push.
+    /// Visits each friction: whether it is torsional, the impulse by which it differs from its law,
+    /// and its limit by the push, N s or N m s.
     fn visit_frictions(&self, at: &Solution, visit: &mut impl FnMut(bool, f64, f64)) {
         let limits = self.limits(&at.forces);
         for (((bundle, forces), due), limit) in
@@ -323,10 +314,12 @@ impl Interior<'_> {
         self.lines.bundles.iter().map(of_bundle).sum()
     }
 
-    /// How far velocities and forces are from a solution without friction's law.
-    fn residual(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> Residual {
+    /// How far velocities and forces are from a solution.
+    fn residual(&self, at: &Solution) -> Residual {
+        let Solution { velocity, forces, .. } = at;
         let mut momentum = self.lack(velocity);
-        let mut worst = 0.0;
+        let (mut worst, mut of_friction) = (0.0, 0.0);
+        self.visit_frictions(at, &mut |_, off, _| of_friction = greater(off, of_friction));
         for batch in &self.lines.batches {
             let group = &self.lines.groups[batch.group];
             let (relative, mut acting) = (group.of(velocity), [Lanes::ZERO; 6]);
@@ -343,7 +336,7 @@ impl Interior<'_> {
         let force = |p: &Vector6<f64>| p.fixed_rows::<3>(0).norm() / self.bodies.time_step;
         Residual {
             way: greater(self.way_of_momentum(&momentum), worst),
-            force: momentum.iter().map(force).fold(0.0, greater),
+            force: momentum.iter().map(force).fold(of_friction / self.bodies.time_step, greater),
         }
     }
 

@@ -1,10 +1,11 @@
 //! Minimises the problems of all islands.
+use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
 use super::Newton;
 use super::geometric::Motion;
-use super::integrate::{unpack, velocity};
+use super::integrate::unpack;
 use super::islands::{Island, islands};
 use super::kept::Known;
 use super::line::Placed;
@@ -13,9 +14,10 @@ use super::rows::{Gap, Resistance, Row, RowForce, carry, matches};
 use super::step::Step;
 use crate::Residual;
 
-/// Bodies are wild when they are faster than what moves them by the first factor, or by the second one
-/// where the solution did not converge. Of a chain of joints from 10 kg to 10 g, such a solution gave a
-/// link 1,900 rad/s, and the steps that followed gave it 1e147 m/s.
+/// Bodies are wild when they are faster than what moves them by the first factor, or by the second
+/// one where the solution did not converge. In a chain of joints from 10 kg to 10 g, such a
+/// solution gave a link 1,900 rad/s. Later ones of the same step were compared with it and gave
+/// 1e147 m/s.
 const WILD: [f64; 2] = [10.0, 2.0];
 
 /// Bodies that move by less in a step are not wild, m: rounding moves bodies that nothing moves.
@@ -137,11 +139,7 @@ impl Newton {
         let asked = placed.iter().map(|placed| asks(placed) / step.h).fold(0.0, f64::max);
         let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
         let minimum = problem.minimise(start.clone(), forces.as_deref());
-        // What an earlier solution of the step says is not known.
-        let states = self.system.states();
-        let before: Vec<_> = island.bodies.iter().map(|&k| velocity(&states[step.free[k].body])).collect();
-        let known = [problem.target(), &before];
-        if !self.is_wild(step, island, rows, asked, known, &minimum) {
+        if !self.is_wild(step, island, rows, asked, problem.target(), &minimum) {
             return minimum;
         }
         let soft = problem.softened();
@@ -150,30 +148,32 @@ impl Newton {
         Minimum { converged: false, residual: Residual { way, ..minimum.residual }, ..minimum }
     }
 
-    /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows
-    /// ask for, m/s or rad/s, also through the ratios of couplings. Then rigid contacts contradict
-    /// each other: a box between a plane and a press that were 0.16 mm too near for it left
-    /// sideways at 2 km/s, because its two sides were touched along directions that differed by 70
-    /// µrad.
+    /// Whether bodies are much faster than anything asks them to be: what moves them, at the
+    /// beginning of the step and without rows (`target`), or what rows ask for, m/s or rad/s, also
+    /// through the ratios of couplings. An earlier solution of the step may be wild itself.
+    ///
+    /// Rigid contacts of wild bodies contradict each other: a box between a plane and a press that
+    /// were 0.16 mm too near for it left sideways at 2 km/s, because its two sides were touched
+    /// along directions that differed by 70 µrad.
     fn is_wild(
         &self,
         step: &Step,
         island: &Island,
         rows: &[Row],
         asked: f64,
-        known: [&[Vector6<f64>]; 2],
+        target: &[Vector6<f64>],
         found: &Minimum,
     ) -> bool {
         let sizes = || island.bodies.iter().map(|&k| self.sizes[step.free[k].body]);
+        let speed = |linear: DVec3, angular: DVec3, size: f64| linear.length() + size * angular.length();
         let fastest = |velocities: &[Vector6<f64>]| {
-            let speed = |(v, size): (&Vector6<f64>, f64)| {
-                let (linear, angular) = unpack(v);
-                linear.length() + size * angular.length()
-            };
-            velocities.iter().zip(sizes()).map(speed).fold(0.0, f64::max)
+            let speeds = velocities.iter().map(unpack).zip(sizes()).map(|((v, w), size)| speed(v, w, size));
+            speeds.fold(0.0, f64::max)
         };
+        let states = island.bodies.iter().map(|&k| &self.system.states()[step.free[k].body]);
+        let before = states.zip(sizes()).map(|(state, size)| speed(state.linear, state.angular, size));
         let asked = asked * sizes().fold(1.0, f64::max);
-        let known = asked + fastest(known[0]).max(fastest(known[1]));
+        let known = asked + before.fold(fastest(target), f64::max);
         let gain: f64 = island.rows.iter().map(|&k| self.gain(step, &rows[k])).product();
         let [sure, unsure] = WILD;
         let factor = if found.converged { sure } else { unsure };

@@ -46,8 +46,8 @@ fn without_contacts_the_chain_falls_apart() {
     assert_eq!(summary.passed, Some(false), "{summary:?}");
 }
 
-/// Bodies of 10 kg to 10 g in a chain of joints that fly apart, two of them begin in each other and in
-/// the floor. A solution that has not converged may be far off, and later ones began from it.
+/// Bodies of 10 kg to 10 g in a chain of joints. Two of them begin in each other and in the floor.
+/// A solution that has not converged may be far off, and later ones were compared with it.
 #[test]
 fn a_chain_of_very_unequal_links_does_not_fly_off() {
     let loaded = LoadedScene::parse(UNEQUAL.into(), "scene.toml").expect("a scene");

@@ -48,6 +48,11 @@ impl Aabb {
         })
     }
 
+    /// The distance to another box along each axis, 0 where their intervals overlap.
+    pub fn gap(self, other: Self) -> DVec3 {
+        (self.min - other.max).max(other.min - self.max).max(DVec3::ZERO)
+    }
+
     /// Whether the closed boxes share a point.
     pub fn overlaps(self, other: Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()

@@ -24,8 +24,8 @@ fn lowest(shape: &Shape, rotation: DQuat) -> f64 {
     clearance(&scene, id, floor, &ClearanceOptions::default()).expect("a clearance").distance - 10.0
 }
 
-/// Bodies that lie on a plane, nearly so, stand on edges and corners, apart by less than the contact
-/// distance, or through the plane.
+/// Bodies that lie on a plane, nearly so, stand on edges and corners, apart by less than the
+/// contact distance, or through the plane.
 #[test]
 fn faces_of_a_body_have_all_contacts_of_a_plane() {
     let mut random = Random(5);
@@ -79,8 +79,9 @@ fn faces_of_a_body_have_all_contacts_of_a_plane() {
             let near = NEAR * size;
             // A body may turn by 0.1 rad before another point is nearer.
             let reach = found.distance.abs();
-            // Heights over the plane are linear in the place on a rigid body. So what is above the lower
-            // hull of its low vertices comes no lower, however the body moves: no slope shows it below all.
+            // Heights over the plane are linear in the place on a rigid body. So a point above the
+            // lower hull of its low vertices comes no lower, however the body moves: no slope shows
+            // it below all.
             let ahead = |c: &Contact, along: DVec3| along.dot(c.point_b - found.point);
             let is_below_all = |along: DVec3, slope: f64| {
                 let slack = near * (1.0 + slope) + (0.005 + 2.0 * slope) * reach;
@@ -92,7 +93,8 @@ fn faces_of_a_body_have_all_contacts_of_a_plane() {
                 let along = world.rotation * DVec3::new(cos, sin, 0.0);
                 (-8..4).all(|digits| !is_below_all(along, 10f64.powi(digits)))
             });
-            // Beside the lowest point of a ball, the plane is hardly farther. Its square has two halves.
+            // Beside the lowest point of a ball, the plane is hardly farther. Its square has two
+            // halves.
             let is_round = matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. });
             let is_beside =
                 is_round && contacts.iter().any(|c| c.point_b.distance(found.point) <= 0.03 * size);

@@ -96,11 +96,13 @@ impl<'a> Cones<'a> {
         self.near + (8.0 * self.tolerance * distance.abs()).sqrt()
     }
 
-    /// Whether the faces of the second body have all contacts per local minimum that hold the first.
+    /// Whether the faces of the second body have all contacts per local minimum that hold the
+    /// first.
     ///
-    /// *A plane*: its height is linear over each face of the other body, so it is lowest at vertices,
-    /// which are contacts of their faces. Other contacts of the plane lie between them, or inside the
-    /// body and less deep. *A ball* has one nearest point on a convex body, which its centre finds.
+    /// *A plane*: its height is linear over each face of the other body, so it is lowest at
+    /// vertices, which are contacts of their faces. Other contacts of the plane lie between them,
+    /// or inside the body and less deep. *A ball* has one nearest point on a convex body, which its
+    /// centre finds.
     pub fn are_of_other_order(&self, per: ContactsPer) -> bool {
         let is_all = match (self.a.shape, self.b.shape) {
             (Shape::Plane, Shape::Mesh(mesh)) => mesh.faces_enclose_the_solid() && mesh.half_thickness == 0.0,

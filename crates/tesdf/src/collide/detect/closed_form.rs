@@ -1,5 +1,6 @@
 //! Minima that have a closed form: of a point in the field of a simple shape, and of a part that is
-//! large, or flat, over a plane. They are those of the search, bit for bit. And parts that have none.
+//! large, or flat, over a plane. They are those of the search, bit for bit. And parts that have
+//! none.
 use glam::DVec3;
 
 use crate::collide::bodies::surface::{Part, PartFacing};
@@ -40,15 +41,14 @@ pub fn minima(
     }
 }
 
-/// Whether the box around a simple shape shows that no point of the part is within reach: the boxes of
-/// both are apart, or the shape lies in front of the plane of the part. So most faces of two boxes that
-/// touch need no search.
+/// Whether the box around a simple shape shows that no point of the part is within reach: the boxes
+/// of both are apart, or the shape lies in front of the plane of the part. So most faces of two
+/// boxes that touch need no search.
 fn is_beyond(simple: Simple, part: &Part, reach: f64) -> bool {
     let (own, bounds) = (Aabb::of(part.points()), simple.bounds());
     let size = own.max.max(-own.min).max(bounds.max).max_element();
     let clear = reach.max(0.0) + CLEAR * size;
-    let gap = (own.min - bounds.max).max(bounds.min - own.max).max(DVec3::ZERO);
-    if gap.length_squared() > clear * clear {
+    if own.gap(bounds).length_squared() > clear * clear {
         return true;
     }
     let lowest = -part.normal.abs().dot(bounds.max);

@@ -167,7 +167,7 @@ pub fn why(
     let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
     let contact_distance = OrderedPair::contact_distance(scene, options, [a, b])?;
     let (bounds_a, bounds_b) = (scene.bounds(a)?, scene.bounds(b)?);
-    let bounds_gap = (bounds_a.min - bounds_b.max).max(bounds_b.min - bounds_a.max).max_element().max(0.0);
+    let bounds_gap = bounds_a.gap(bounds_b).max_element();
     let pair = match () {
         () if a == b => PairVerdict::SameInstance,
         () if of_a.world != of_b.world => PairVerdict::OtherWorlds,
