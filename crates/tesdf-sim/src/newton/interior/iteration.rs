@@ -10,6 +10,13 @@ use crate::newton::lanes::{Lanes, WIDTH};
 use crate::newton::line::{Bundle, Forces, Slips, dot};
 use crate::newton::linear::{BlockMatrix, Factor};
 
+/// Rows without bounds are at least as soft in the matrix, in the units of rows (the proximal
+/// method of multipliers: Rockafellar, *Augmented Lagrangians and applications of the proximal
+/// point algorithm*, Math. Oper. Res. 1976). What they leave is the same. With the 1e-13 of rigid
+/// rows in the matrix, rounding was as great as the numbers: the iterations for three joints from
+/// 10 kg to 10 g, a linear problem, grew to 1e23 m/s, or took up to 100 in place of 3. From 1e-12
+/// to 1e-7 they take as few.
+const PROXIMAL: f64 = 1e-9;
 /// Lagged limits stay once the root of ν is below this gap, m.
 const FREEZE: f64 = 1e-5;
 /// An iterate is the solution when the last iteration leaves no more of a gap, m.
@@ -154,7 +161,7 @@ impl<'a> Iterate<'a> {
             for bundle in &of.lines.bundles[batch.bundles.clone()] {
                 let mut k = Lanes::splat(1.0);
                 for lane in (0..WIDTH).filter(|&lane| bundle.count_bounds(lane) == 0) {
-                    k.0[lane] = 1.0 / bundle.compliance.0[lane];
+                    k.0[lane] = 1.0 / bundle.compliance.0[lane].max(PROXIMAL);
                 }
                 let way = bundle.slip.as_ref().map_or([Lanes::ZERO; 2], |slip| slip.way.map(|way| -way));
                 bundle.act(-(k * bundle.gap), way, &mut acting);
@@ -379,8 +386,8 @@ impl<'a> Iterate<'a> {
         (((1.0 - shorter) * corrected.longest).min(1.0), centre)
     }
 
-    /// Goes along a direction. Returns the greatest way that torsional friction would bring beyond its
-    /// limit, m.
+    /// Goes along a direction. Returns the greatest way that torsional friction would bring beyond
+    /// its limit, m.
     #[inline(always)]
     fn advance(&mut self, direction: &Direction, step: f64, limits: &Limits) -> f64 {
         let mut beyond = Lanes::ZERO;
@@ -513,7 +520,9 @@ impl Local {
     ) -> Self {
         // Where a bound is infinite, the slack is zero and the room infinite.
         let [low, high] = [0, 1].map(|k| state.slack[k] / state.room[k]);
-        let softness = bundle.compliance + low + high;
+        let softness = (bundle.compliance + low + high).zip(low + high, |softness, bounds| {
+            if bounds == 0.0 { softness.max(PROXIMAL) } else { softness }
+        });
         let residual =
             bundle.at(relative) + bundle.compliance * state.force - state.slack[0] + state.slack[1];
         let slip = bundle.slip.as_ref().map_or(Slipping::default(), |slip| {
@@ -540,8 +549,8 @@ impl Local {
         Self { residual, stiffness: Lanes::splat(1.0) / softness, slip }
     }
 
-    /// The changes when the velocities stay, to these changes of the products, and to ν of friction.
-    /// Friction follows its own push, or that which has `followed`.
+    /// The changes when the velocities stay, to these changes of the products, and to ν of
+    /// friction. Friction follows its own push, or that which has `followed`.
     #[inline(always)]
     fn standing(
         &self,
