@@ -34,7 +34,8 @@ arm_programs() {
     [ -x "$qemu" ] && [ -x "$python_on_arm" ]
 }
 if ! arm_programs && command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null; then
-    debian_packages arm64 python3
+    # numpy needs the library of C++.
+    debian_packages arm64 python3 libstdc++6
     [ -x "$qemu" ] || debian_packages "$(dpkg --print-architecture)" qemu-user-static
 fi
 if arm_programs; then
