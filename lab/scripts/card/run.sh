@@ -126,7 +126,7 @@ for n in 16 256 1024; do collide "worlds_$n" 60 bolt-nut --mode node --frames 1 
 collide worlds_exact_64 30 bolt-nut --mode exact --contacts-per minimum --frames 1 --repeat 3 --worlds 64
 
 # The same contacts as on the processor.
-step tests 300 sh -c 'cd crates/tesdf-gpu && exec "$W/gpu_tests" --test-threads 12'
+step tests 300 sh -c 'cd crates/tesdf-gpu && exec "$W/gpu_tests" --test-threads 12 --skip driver_faults::'
 
 # Races, and accesses out of bounds.
 sanitize racecheck 60 racecheck --mode face

@@ -143,6 +143,8 @@ impl Detector {
     /// - [`GpuError::Unavailable`] when vertices have moved on the device and the scene now has
     ///   other shapes.
     /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
+    ///   The next detection starts from small buffers and works, such as once there is enough
+    ///   memory, unless the error says that all later calls fail.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)
     }
@@ -277,8 +279,9 @@ impl Detector {
             if matches!(options.reduction, Reduction::PerPair(_)) {
                 self.buffers.add_members(&self.device)?;
             }
-            let (counts, placed) = self.pass(&instances, given, options, normals, timing)?;
-            if !self.grow(&counts)? {
+            let pass = self.pass(&instances, given, options, normals, timing);
+            let (counts, placed) = pass.inspect_err(|e| self.forget(e))?;
+            if !self.grow(&counts).inspect_err(|e| self.forget(e))? {
                 self.report.counts = counts;
                 return Ok((instances, placed));
             }
@@ -309,8 +312,24 @@ impl Detector {
         if room == self.buffers.room {
             return Ok(false);
         }
+        // The old ones are freed before the new ones are allocated.
+        self.buffers = PipelineBuffers::new(&self.device, Capacities::NONE)?;
         self.buffers = PipelineBuffers::new(&self.device, room)?;
         Ok(true)
+    }
+
+    /// Forgets what an operation that failed has left without memory or contents: the device
+    /// reports a buffer that it cannot allocate when the buffer is used. The next detection starts
+    /// from small buffers again.
+    fn forget(&mut self, error: &GpuError) {
+        if matches!(error, GpuError::Device { .. } | GpuError::TooLarge { .. }) {
+            if let Ok(buffers) = PipelineBuffers::new(&self.device, self.options.capacities) {
+                self.buffers = buffers;
+            }
+            if !self.shapes.have_moved() {
+                self.shape_ids.clear();
+            }
+        }
     }
 
     /// The tolerance for each instance, in the frame of its field.

@@ -22,6 +22,12 @@ pub struct Capacities {
     pub kept: u32,
 }
 
+impl Capacities {
+    /// Room for nothing.
+    pub(super) const NONE: Self =
+        Self { ordered_pairs: 0, blocks: 0, meshlets: 0, polygons: 0, contacts: 0, kept: 0 };
+}
+
 impl Default for Capacities {
     /// Capacities that take about 10 MiB.
     fn default() -> Self {

@@ -2,26 +2,78 @@
 use std::ffi::{CString, c_void};
 use std::sync::LazyLock;
 
-use cubecl_server::driver::DriverError as Failure;
+use cubecl::server::{IoError, ServerError};
+use cubecl_environment::backtrace::BackTrace;
+use cubecl_runtime::poison::DevicePoison;
 use cudarc::driver::sys::CUdevice_attribute as Attribute;
 use cudarc::driver::sys::CUresult;
 use cudarc::driver::{DriverError, result, sys};
 
-/// Turns an error of a driver call into a failure of the server.
-pub fn failed(call: &'static str) -> impl FnOnce(DriverError) -> Failure {
+/// A call of the driver that failed.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{call}: {reason}")]
+pub struct Failure {
+    call: &'static str,
+    reason: String,
+    ends_the_context: bool,
+}
+
+/// Turns an error of a driver call into a failure.
+fn failed(call: &'static str) -> impl FnOnce(DriverError) -> Failure {
     move |error| {
+        let text = error.error_string().map(|text| text.to_string_lossy().into_owned());
         let status = error.0 as u32;
-        // After one of these errors, all later calls in the context fail.
-        let ends_the_context = matches!(
-            error.0,
-            CUresult::CUDA_ERROR_ILLEGAL_ADDRESS
-                | CUresult::CUDA_ERROR_LAUNCH_FAILED
-                | CUresult::CUDA_ERROR_LAUNCH_TIMEOUT
-                | CUresult::CUDA_ERROR_ILLEGAL_INSTRUCTION
-                | CUresult::CUDA_ERROR_MISALIGNED_ADDRESS
-                | CUresult::CUDA_ERROR_ECC_UNCORRECTABLE
-        );
-        if ends_the_context { Failure::poisoned(call, status) } else { Failure::new(call, status) }
+        let mut reason = format!("{} (status {status})", text.unwrap_or_else(|_| "failed".into()));
+        let ends_the_context = ends_the_context(error.0);
+        if ends_the_context {
+            reason += ". All later calls of this process fail, too: start it again";
+        }
+        Failure { call, reason, ends_the_context }
+    }
+}
+
+/// Whether all later calls in the context fail after an error. CUDA's driver API says so of each of
+/// these, or that its device or context is gone.
+fn ends_the_context(error: CUresult) -> bool {
+    // Of drivers later than the headers.
+    const CONTAINED: u32 = 226;
+    const TENSOR_MEMORY_LEAK: u32 = 721;
+    matches!(
+        error,
+        CUresult::CUDA_ERROR_ECC_UNCORRECTABLE
+            | CUresult::CUDA_ERROR_NVLINK_UNCORRECTABLE
+            | CUresult::CUDA_ERROR_ILLEGAL_ADDRESS
+            | CUresult::CUDA_ERROR_LAUNCH_TIMEOUT
+            | CUresult::CUDA_ERROR_CONTEXT_IS_DESTROYED
+            | CUresult::CUDA_ERROR_ASSERT
+            | CUresult::CUDA_ERROR_HARDWARE_STACK_ERROR
+            | CUresult::CUDA_ERROR_ILLEGAL_INSTRUCTION
+            | CUresult::CUDA_ERROR_MISALIGNED_ADDRESS
+            | CUresult::CUDA_ERROR_INVALID_ADDRESS_SPACE
+            | CUresult::CUDA_ERROR_INVALID_PC
+            | CUresult::CUDA_ERROR_LAUNCH_FAILED
+            | CUresult::CUDA_ERROR_MPS_CLIENT_TERMINATED
+            | CUresult::CUDA_ERROR_EXTERNAL_DEVICE
+    ) || matches!(error as u32, CONTAINED | TENSOR_MEMORY_LEAK)
+}
+
+impl From<Failure> for ServerError {
+    fn from(failure: Failure) -> Self {
+        let reason = failure.to_string();
+        match failure.ends_the_context {
+            true => DevicePoison::new(reason).into(),
+            false => Self::Generic { reason, backtrace: BackTrace::capture() },
+        }
+    }
+}
+
+impl From<Failure> for IoError {
+    fn from(failure: Failure) -> Self {
+        let description = failure.to_string();
+        match failure.ends_the_context {
+            true => DevicePoison::new(description).into(),
+            false => Self::Unknown { description, backtrace: BackTrace::capture() },
+        }
     }
 }
 
@@ -147,13 +199,20 @@ impl Gpu {
 
     pub fn allocate(&self, bytes: usize) -> Result<u64, Failure> {
         // SAFETY: the stream is never destroyed, and the memory is used in this stream alone.
-        unsafe {
+        let allocated = unsafe {
             if self.facts.has_pools {
                 result::malloc_async(self.stream, bytes).map_err(failed("cuMemAllocAsync"))
             } else {
                 result::malloc_sync(bytes).map_err(failed("cuMemAlloc"))
             }
-        }
+        };
+        allocated.map_err(|mut failure| {
+            failure.reason += &format!("; expected {bytes} bytes");
+            if let Ok((free, total)) = result::mem_get_info() {
+                failure.reason += &format!(", of {total} bytes {free} are free");
+            }
+            failure
+        })
     }
 
     /// # Safety

@@ -7,7 +7,7 @@ use cubecl_environment::backtrace::BackTrace;
 use cubecl_runtime::memory_management::{ManagedMemoryHandle, ManagedMemoryId};
 use cubecl_runtime::storage::{ComputeStorage, StorageHandle, StorageId, StorageUtilization};
 
-use super::driver::Gpu;
+use super::driver::{Failure, Gpu};
 
 /// Every allocation begins at a multiple of this number of bytes.
 pub const ALIGNMENT: usize = 256;
@@ -89,13 +89,19 @@ impl Memory {
         Self { storage: Storage { gpu, held: HashMap::new() }, allocations: HashMap::new() }
     }
 
-    /// Allocates memory for a buffer.
-    pub fn allocate(&mut self, handle: ManagedMemoryHandle, bytes: u64) -> Result<(), ServerError> {
+    /// Allocates memory for a buffer, where the context is `current`.
+    pub fn allocate(
+        &mut self,
+        handle: ManagedMemoryHandle,
+        bytes: u64,
+        current: Result<(), Failure>,
+    ) -> Result<(), ServerError> {
         self.give_back();
-        let (place, failure) = match self.storage.alloc(bytes.max(1)) {
-            Ok(storage) => (Place::Ours(storage), None),
-            Err(error) => (Place::None, Some(ServerError::from(error))),
-        };
+        let (place, failure) =
+            match current.map_err(IoError::from).and_then(|()| self.storage.alloc(bytes.max(1))) {
+                Ok(storage) => (Place::Ours(storage), None),
+                Err(error) => (Place::None, Some(ServerError::from(error))),
+            };
         self.insert(handle, place, failure.clone());
         failure.map_or(Ok(()), Err)
     }

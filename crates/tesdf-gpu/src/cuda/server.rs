@@ -1,5 +1,6 @@
 //! The server that runs the launches on a CUDA device.
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -31,7 +32,7 @@ use super::driver::{self, Event, Facts, Function, Gpu};
 use super::kernel_cache;
 use super::memory::{ALIGNMENT, Memory, Storage};
 use super::nvrtc::architecture;
-use super::source::{least_hardware, properties, source};
+use super::source::{CudaSource, least_hardware, properties, source};
 use crate::GpuError;
 use crate::device::stream::STREAM;
 use crate::kernels::catalog::Count;
@@ -48,7 +49,7 @@ pub struct CudaServer {
     architecture: String,
     utilities: Arc<ServerUtilities>,
     memory: Memory,
-    kernels: HashMap<(KernelId, Count), Arc<Loaded>>,
+    kernels: Kernels,
     /// The first failure that no caller has received yet.
     failure: Option<ServerError>,
     /// Start events of the stages that are being timed.
@@ -56,10 +57,13 @@ pub struct CudaServer {
     next_stage: u64,
 }
 
+type Kernels = HashMap<(KernelId, Count), Kernel>;
+
 #[derive(Debug)]
-struct Loaded {
-    function: Function,
-    io: Vec<BufferIOAttr>,
+struct Kernel {
+    source: CudaSource,
+    /// Present once the kernel is loaded.
+    function: Option<Function>,
 }
 
 /// Number of CUDA devices; 0 when no driver is installed.
@@ -138,7 +142,7 @@ pub fn pointer(client: &Client, handle: Handle) -> Result<u64, ServerError> {
 impl CudaServer {
     fn open(index: usize) -> Result<Self, GpuError> {
         let device = || format!("cuda:{index}");
-        let failed = |e: cubecl_server::driver::DriverError| GpuError::Device {
+        let failed = |e: driver::Failure| GpuError::Device {
             device: device(),
             doing: "opening the device",
             reason: e.to_string(),
@@ -164,31 +168,14 @@ impl CudaServer {
         })
     }
 
-    /// Returns a kernel, and at the first call loads it from the cache or compiles it.
-    fn load(&mut self, kernel: &dyn CubeKernel, count: Count) -> Result<Arc<Loaded>, ServerError> {
-        let key = (kernel.id(), count);
-        if let Some(loaded) = self.kernels.get(&key) {
-            return Ok(loaded.clone());
-        }
-        let refused = |e: GpuError| generic(e.to_string());
-        let mut source = source(kernel, kernel.name()).map_err(refused)?;
-        if count == Count::Indirect {
-            source = source.counted_by_device().map_err(refused)?;
-        }
-        let image = kernel_cache::image(&source, &self.architecture).map_err(refused)?;
-        let function = self.gpu.load(&image, &source.entry, source.threads, source.shared_bytes)?;
-        let loaded = Arc::new(Loaded { function, io: source.io });
-        self.kernels.insert(key, loaded.clone());
-        Ok(loaded)
-    }
-
     fn run(
         &mut self,
-        loaded: &Loaded,
+        function: Function,
+        io: &[BufferIOAttr],
         count: &CubeCount,
         arguments: &KernelArguments,
     ) -> Result<(), ServerError> {
-        for buffer in arguments.buffers_read(Some(&loaded.io)) {
+        for buffer in arguments.buffers_read(Some(io)) {
             self.memory.check(buffer)?;
         }
         if arguments.info.dynamic_metadata_offset < arguments.info.data.len() {
@@ -206,7 +193,7 @@ impl CudaServer {
             CubeCount::Dynamic(buffer) => {
                 self.memory.check(buffer)?;
                 pointers.push(self.memory.pointer(buffer)?);
-                (WAVES * loaded.function.resident, 1, 1)
+                (WAVES * function.resident, 1, 1)
             }
         };
         let mut addresses: Vec<*mut c_void> = pointers.iter_mut().map(|p| (&raw mut *p).cast()).collect();
@@ -217,7 +204,7 @@ impl CudaServer {
         }
         // SAFETY: the arguments are in the order that the module's documentation gives. Kernels
         // stay within their buffers.
-        unsafe { self.gpu.launch(loaded.function, blocks, &mut addresses) }?;
+        unsafe { self.gpu.launch(function, blocks, &mut addresses) }?;
         Ok(())
     }
 
@@ -261,6 +248,40 @@ impl CudaServer {
     }
 }
 
+impl Kernel {
+    /// The kernel of a launch. At the first call its text is made.
+    fn of<'a>(
+        known: &'a mut Kernels,
+        kernel: &dyn CubeKernel,
+        count: Count,
+    ) -> Result<&'a mut Self, ServerError> {
+        match known.entry((kernel.id(), count)) {
+            Entry::Occupied(known) => Ok(known.into_mut()),
+            Entry::Vacant(place) => {
+                let mut source = source(kernel, kernel.name()).map_err(refused)?;
+                if count == Count::Indirect {
+                    source = source.counted_by_device().map_err(refused)?;
+                }
+                Ok(place.insert(Self { source, function: None }))
+            }
+        }
+    }
+
+    /// The loaded kernel. The first call that succeeds loads it from the cache, or compiles it.
+    fn load(&mut self, gpu: &Gpu, architecture: &str) -> Result<Function, ServerError> {
+        let Self { source, function } = self;
+        if let Some(function) = function {
+            return Ok(*function);
+        }
+        let image = kernel_cache::image(source, architecture).map_err(refused)?;
+        Ok(*function.insert(gpu.load(&image, &source.entry, source.threads, source.shared_bytes)?))
+    }
+}
+
+fn refused(error: GpuError) -> ServerError {
+    generic(error.to_string())
+}
+
 fn generic(reason: String) -> ServerError {
     ServerError::Generic { reason, backtrace: BackTrace::capture() }
 }
@@ -291,8 +312,8 @@ impl Server for CudaServer {
         size: u64,
         _: StreamId,
     ) -> Result<(), ServerError> {
-        self.gpu.make_current()?;
-        self.memory.allocate(memory, size)
+        let current = self.gpu.make_current();
+        self.memory.allocate(memory, size, current)
     }
 
     fn logger(&self) -> Arc<ServerLogger> {
@@ -321,7 +342,8 @@ impl Server for CudaServer {
 
     fn sync(&mut self, handles: Vec<BufferBinding>, stream: StreamId) -> DynFut<Result<(), ServerError>> {
         let waited = self.gpu.make_current().and_then(|()| self.gpu.wait()).map_err(ServerError::from);
-        ready(waited.and_then(|()| self.report()).and_then(|()| self.check(handles, stream)))
+        let reported = self.report();
+        ready(waited.and(reported).and_then(|()| self.check(handles, stream)))
     }
 
     fn check(&mut self, handles: Vec<BufferBinding>, _: StreamId) -> Result<(), ServerError> {
@@ -337,16 +359,24 @@ impl Server for CudaServer {
         mode: LaunchMode,
     ) {
         let way = if matches!(count, CubeCount::Dynamic(_)) { Count::Indirect } else { Count::Direct };
-        let loaded =
-            self.gpu.make_current().map_err(ServerError::from).and_then(|()| self.load(&*kernel, way));
+        let kernel = match Kernel::of(&mut self.kernels, &*kernel, way) {
+            Ok(kernel) => kernel,
+            Err(error) => return self.settle(bindings.buffers_written(None), Err(error)),
+        };
+        // A launch that fails leaves the buffers that it reads as they are.
+        let io = kernel.source.io.clone();
+        let current = self.gpu.make_current().map_err(ServerError::from);
+        let loaded = current.and_then(|()| kernel.load(&self.gpu, &self.architecture));
         if mode.is_skipped() {
             return;
         }
-        let (result, io) = match &loaded {
-            Ok(loaded) => (self.run(loaded, &count, &bindings), Some(loaded.io.as_slice())),
-            Err(error) => (Err(error.clone()), None),
+        // After a failure nothing runs until it is reported: a buffer that counters are in counts
+        // as read only, so it does not tell that a launch has left it without contents.
+        let result = match &self.failure {
+            Some(failure) => Err(failure.clone()),
+            None => loaded.and_then(|function| self.run(function, &io, &count, &bindings)),
         };
-        self.settle(bindings.buffers_written(io), result);
+        self.settle(bindings.buffers_written(Some(&io)), result);
     }
 
     fn flush(&mut self, _: StreamId) -> Result<(), ServerError> {

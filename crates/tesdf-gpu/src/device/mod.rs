@@ -159,6 +159,18 @@ impl Id {
     }
 }
 
+/// The message of the driver in an error of CubeCL, which stands below those of the layers above it
+/// and before a backtrace.
+fn reason(error: &impl fmt::Display) -> String {
+    let text = error.to_string();
+    let of_driver = text.rsplit("Caused by:").next().unwrap_or_default();
+    let lines = of_driver.lines().map(str::trim).filter(|line| !line.is_empty());
+    let lines = lines.take_while(|line| !line.to_lowercase().contains("backtrace"));
+    let message: Vec<&str> = lines.collect();
+    let message = message.join(" ");
+    message.strip_prefix("Unknown error happened during execution: ").unwrap_or(&message).to_owned()
+}
+
 impl Device {
     /// Opens a device. `asked` is the number of a device in [`devices`], or a part of its name,
     /// such as `cuda:0`; upper and lower case are equal. `wgpu:0` is the first device that is
@@ -220,10 +232,21 @@ impl Device {
     /// # Errors
     /// [`GpuError::Device`] when a launch failed.
     pub fn wait(&self) -> Result<(), GpuError> {
-        cubecl::future::block_on(self.client.sync()).map_err(|e| GpuError::Device {
+        self.check("waiting", [])
+    }
+
+    /// Waits until all launches and copies are complete. Fails where one of them failed, or left
+    /// one of these buffers without memory or contents, while `doing` this.
+    pub(crate) fn check<'a>(
+        &self,
+        doing: &'static str,
+        buffers: impl IntoIterator<Item = &'a Buffer>,
+    ) -> Result<(), GpuError> {
+        let handles = buffers.into_iter().map(|buffer| &buffer.handle);
+        cubecl::future::block_on(self.client.sync_buffers(handles)).map_err(|e| GpuError::Device {
             device: self.info.name.clone(),
-            doing: "waiting",
-            reason: e.to_string(),
+            doing,
+            reason: reason(&e),
         })
     }
 
@@ -303,9 +326,9 @@ impl Device {
             doing: "timing a stage",
             reason,
         };
-        let window = self.client.profile_start().map_err(|e| failed(format!("{e:?}")))?;
+        let window = self.client.profile_start().map_err(|e| failed(reason(&e)))?;
         launch();
-        let time = self.client.profile_end(window).map_err(|e| failed(format!("{e:?}")))?;
+        let time = self.client.profile_end(window).map_err(|e| failed(reason(&e)))?;
         cubecl::future::block_on(time.resolve())
             .map(|ticks| ticks.duration())
             .ok_or_else(|| failed("the device gave no time".into()))
@@ -322,7 +345,7 @@ impl Device {
         let read = self.client.read_one(handle).map_err(|e| GpuError::Device {
             device: self.info.name.clone(),
             doing: buffer.name,
-            reason: e.to_string(),
+            reason: reason(&e),
         })?;
         Ok(bytemuck::pod_collect_to_vec(&read[..bytes]))
     }

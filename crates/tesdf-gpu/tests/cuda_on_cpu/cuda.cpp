@@ -10,7 +10,10 @@
 //
 // A GPU promises no order of blocks, nor of threads between two barriers. With CUDA_ON_CPU_ORDER=SEED
 // both orders are random, and others in each launch and after each barrier.
+//
+// After `cuda_on_cpu_fail` a call fails, alone or with all later ones.
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -42,6 +45,30 @@ static const int INVALID = 1, NO_CONTEXT = 201, NOT_FOUND = 500;
     _exit(70);
 }
 
+// Calls that fail.
+
+static std::atomic<uint64_t> calls = 0, first_failure = 0, last_failure = 0;
+static int failure;
+static std::atomic<const char *> failed_call = "";
+
+// From now on, the calls from number `first` (from 1) to `last` fail with `status`. Returns the number of
+// calls that could have failed since this function was called last.
+CUDA uint64_t cuda_on_cpu_fail(uint64_t first, uint64_t last, int status) {
+    first_failure = first, last_failure = last, failure = status, failed_call = "";
+    return calls.exchange(0);
+}
+// The first call that failed since, or an empty text.
+CUDA const char *cuda_on_cpu_failed() { return failed_call; }
+
+static bool fails(const char *call) {
+    const uint64_t number = ++calls;
+    if (number < first_failure || number > last_failure) return false;
+    const char *none = failed_call;
+    if (!*none) failed_call.compare_exchange_strong(none, call);
+    return true;
+}
+#define MAY_FAIL if (fails(__func__)) return failure;
+
 // Devices and memory.
 
 static thread_local void *current = nullptr;
@@ -61,13 +88,17 @@ CUDA int cuDeviceGetAttribute(int *value, int attribute, int) {
     return 0;
 }
 CUDA int cuDevicePrimaryCtxRetain(void **context, int) { *context = CONTEXT; return 0; }
-CUDA int cuCtxSetCurrent(void *context) { current = context; return 0; }
+CUDA int cuCtxSetCurrent(void *context) { MAY_FAIL current = context; return 0; }
 CUDA int cuStreamCreate(void **stream, unsigned flags) { *stream = STREAM; return flags == 0 ? 0 : INVALID; }
 CUDA int cuDeviceGetDefaultMemPool(void **pool, int) { *pool = POOL; return 0; }
 CUDA int cuMemPoolSetAttribute(void *pool, int, void *) { return pool == POOL ? 0 : INVALID; }
-CUDA int cuGetErrorString(int, const char **text) { *text = "see cuda.h"; return 0; }
+CUDA int cuGetErrorString(int error, const char **text) {
+    *text = error == 2 ? "out of memory" : error == 719 ? "unspecified launch failure" : "see cuda.h";
+    return 0;
+}
 
 CUDA int cuMemAllocAsync(uint64_t *pointer, size_t bytes, void *stream) {
+    MAY_FAIL
     if (current != CONTEXT) return NO_CONTEXT;
     if (stream != STREAM) return INVALID;
     const size_t page = sysconf(_SC_PAGESIZE), all = (bytes + page - 1) / page * page + 2 * page;
@@ -80,27 +111,36 @@ CUDA int cuMemAllocAsync(uint64_t *pointer, size_t bytes, void *stream) {
     return 0;
 }
 CUDA int cuMemFreeAsync(uint64_t pointer, void *) {
+    MAY_FAIL
     auto found = taken.find(pointer);
     if (current != CONTEXT || found == taken.end()) return INVALID;
     munmap(found->second.first, found->second.second);
     taken.erase(found);
     return 0;
 }
+CUDA int cuMemGetInfo_v2(size_t *free, size_t *total) {
+    cuDeviceTotalMem_v2(total, 0);
+    *free = *total;
+    for (const auto &one : taken) *free -= std::min(*free, one.second.second);
+    return 0;
+}
 CUDA int cuMemcpyHtoDAsync_v2(uint64_t to, const void *from, size_t bytes, void *stream) {
+    MAY_FAIL
     if (current != CONTEXT || stream != STREAM) return NO_CONTEXT;
     memcpy((void *)to, from, bytes);
     return 0;
 }
 CUDA int cuMemcpyDtoHAsync_v2(void *to, uint64_t from, size_t bytes, void *stream) {
+    MAY_FAIL
     if (current != CONTEXT || stream != STREAM) return NO_CONTEXT;
     memcpy(to, (void *)from, bytes);
     return 0;
 }
-CUDA int cuStreamSynchronize(void *) { return current == CONTEXT ? 0 : NO_CONTEXT; }
+CUDA int cuStreamSynchronize(void *) { MAY_FAIL return current == CONTEXT ? 0 : NO_CONTEXT; }
 
-CUDA int cuEventCreate(void **event, unsigned) { *event = new timespec{}; return 0; }
-CUDA int cuEventRecord(void *event, void *) { return clock_gettime(CLOCK_MONOTONIC, (timespec *)event); }
-CUDA int cuEventSynchronize(void *) { return 0; }
+CUDA int cuEventCreate(void **event, unsigned) { MAY_FAIL *event = new timespec{}; return 0; }
+CUDA int cuEventRecord(void *event, void *) { MAY_FAIL return clock_gettime(CLOCK_MONOTONIC, (timespec *)event); }
+CUDA int cuEventSynchronize(void *) { MAY_FAIL return 0; }
 CUDA int cuEventElapsedTime(float *milliseconds, void *from, void *to) {
     auto *a = (timespec *)from, *b = (timespec *)to;
     *milliseconds = (b->tv_sec - a->tv_sec) * 1e3f + (b->tv_nsec - a->tv_nsec) * 1e-6f;
@@ -122,6 +162,7 @@ struct Kernel {
 };
 
 CUDA int cuModuleLoadData(void **module, const void *image) {
+    MAY_FAIL
     if (current != CONTEXT) return NO_CONTEXT;
     *module = dlopen((const char *)image + strlen(MAGIC), RTLD_NOW | RTLD_LOCAL);
     return *module ? 0 : INVALID;
@@ -131,6 +172,7 @@ template <typename T> static bool find(T &to, void *module, const char *name) {
     return to != nullptr;
 }
 CUDA int cuModuleGetFunction(void **function, void *module, const char *name) {
+    MAY_FAIL
     auto *k = new Kernel{name};
     bool whole = dlsym(module, name) && find(k->run, module, "cuda_run") && find(k->thread, module, "threadIdx") &&
                  find(k->block, module, "blockIdx") && find(k->grid, module, "gridDim") && find(k->threads, module, "blockDim") &&
@@ -139,9 +181,9 @@ CUDA int cuModuleGetFunction(void **function, void *module, const char *name) {
     *function = k;
     return whole ? 0 : NOT_FOUND;
 }
-CUDA int cuFuncSetAttribute(void *, int, int) { return 0; }
+CUDA int cuFuncSetAttribute(void *, int, int) { MAY_FAIL return 0; }
 // A small number, so that the loop of an indirect launch runs more than once.
-CUDA int cuOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, void *, int, size_t) { *blocks = 2; return 0; }
+CUDA int cuOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, void *, int, size_t) { MAY_FAIL *blocks = 2; return 0; }
 
 enum class Fiber { Ready, Done };
 // A fiber and the launcher enter each other by `_longjmp`: `swapcontext` calls the kernel of the operating
@@ -219,6 +261,7 @@ static void run_block(unsigned threads) {
 }
 CUDA int cuLaunchKernel(void *function, unsigned gx, unsigned gy, unsigned gz, unsigned bx, unsigned by, unsigned bz, unsigned shared,
                         void *stream, void **parameters, void **) {
+    MAY_FAIL
     if (current != CONTEXT) return NO_CONTEXT;
     if (stream != STREAM || gx == 0 || gy == 0 || gz == 0 || by != 1 || bz != 1) return INVALID;
     while (fibers.size() < bx) fibers.push_back({std::vector<char>(256 << 10), {}, false});

@@ -7,6 +7,8 @@ mod contacts_per_face;
 #[cfg(feature = "cuda")]
 mod cuda_source;
 mod degenerate;
+#[cfg(feature = "cuda")]
+mod driver_faults;
 mod encode;
 mod flush_patches;
 mod hidden;

@@ -48,7 +48,8 @@ impl GpuShapes {
     ///
     /// # Errors
     /// [`GpuError::Shape`] for a shape that the kernels cannot read; [`GpuError::TooLarge`] for a
-    /// buffer that is larger than the device can bind.
+    /// buffer that is larger than the device can bind; [`GpuError::Device`] when the device fails,
+    /// such as for lack of memory.
     pub fn upload(device: &Device, shapes: &[Shape]) -> Result<Self, GpuError> {
         let mut packed = Packed::default();
         for (number, shape) in shapes.iter().enumerate() {
@@ -60,7 +61,7 @@ impl GpuShapes {
             jumps: any(|entry| entry[RULE as usize] == GENERALIZED),
             turned: any(|entry| entry[TURNED as usize] == 1),
         };
-        Ok(Self {
+        let uploaded = Self {
             device: device.clone(),
             table: device.upload("shapes", &packed.table)?,
             words: device.upload("words of shapes", &packed.words)?,
@@ -70,7 +71,9 @@ impl GpuShapes {
             moving: packed.table.chunks(STRIDE as usize).zip(shapes).map(Moving::new).collect(),
             moved: false,
             rules,
-        })
+        };
+        device.check("uploading shapes", [&uploaded.table, &uploaded.words, &uploaded.rows])?;
+        Ok(uploaded)
     }
 
     /// The buffers as an argument of kernels.
@@ -81,7 +84,9 @@ impl GpuShapes {
     /// Uploads the fans of vertices, unless they are there.
     pub(crate) fn add_fans(&mut self) -> Result<(), GpuError> {
         if self.fans.is_none() {
-            self.fans = Some(self.device.upload("faces of vertices", &fans(&self.shapes))?);
+            let fans = self.device.upload("faces of vertices", &fans(&self.shapes))?;
+            self.device.check("uploading faces of vertices", [&fans])?;
+            self.fans = Some(fans);
         }
         Ok(())
     }
