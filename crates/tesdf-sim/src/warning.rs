@@ -312,12 +312,17 @@ pub(crate) fn of_hidden(pair: &HiddenPair, time: f64) -> Warning {
 }
 
 fn not_converged(totals: &Totals, time_step: f64) -> Option<Warning> {
-    let Totals { steps, unconverged, first_unconverged, residual: Residual { way, force }, .. } = *totals;
+    let &Totals { steps, unconverged, first_unconverged, residual, .. } = totals;
     let first = first_unconverged? as f64 * time_step;
+    let why = if residual == Residual::default() {
+        "fast bodies may have passed into each other".to_owned()
+    } else {
+        let Residual { way, force } = residual;
+        let way = 1e6 * way;
+        format!("contacts, friction and joints are off by {way:.3e} µm and {force:.3e} N at most")
+    };
     let message = format!(
-        "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: contacts, friction and joints are off by {:.3e} µm \
-         and {force:.3e} N at most; shorten the time step",
-        1e6 * way
+        "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: {why}; shorten the time step"
     );
     let value = unconverged as f64 / steps as f64;
     let (kind, names) = (WarningKind::NotConverged, Vec::new());

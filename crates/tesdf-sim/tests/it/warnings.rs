@@ -192,4 +192,6 @@ fn steps_that_do_not_converge_are_told() {
     assert_eq!(summary.unconverged_steps, 20);
     let told = of(WarningKind::NotConverged, &summary);
     assert_eq!((told.count, told.value), (20, 1.0));
+    // No solve leaves anything, so what did not converge is the motion of a fast pair.
+    assert!(told.message.contains("fast bodies may have passed into each other"), "{}", told.message);
 }
