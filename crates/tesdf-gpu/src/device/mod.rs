@@ -243,11 +243,11 @@ impl Device {
         buffers: impl IntoIterator<Item = &'a Buffer>,
     ) -> Result<(), GpuError> {
         let handles = buffers.into_iter().map(|buffer| &buffer.handle);
-        cubecl::future::block_on(self.client.sync_buffers(handles)).map_err(|e| GpuError::Device {
-            device: self.info.name.clone(),
-            doing,
-            reason: reason(&e),
-        })
+        cubecl::future::block_on(self.client.sync_buffers(handles)).map_err(|e| self.failed(doing, &e))
+    }
+
+    fn failed(&self, doing: &'static str, error: &impl fmt::Display) -> GpuError {
+        GpuError::Device { device: self.info.name.clone(), doing, reason: reason(error) }
     }
 
     /// The client that launches kernels.
@@ -321,17 +321,13 @@ impl Device {
     /// Runs `launch`, and measures the device time of the kernels that it launches, after all
     /// earlier launches are complete.
     pub(crate) fn time(&self, launch: impl FnOnce()) -> Result<Duration, GpuError> {
-        let failed = |reason: String| GpuError::Device {
-            device: self.info.name.clone(),
-            doing: "timing a stage",
-            reason,
-        };
-        let window = self.client.profile_start().map_err(|e| failed(reason(&e)))?;
+        const DOING: &str = "timing a stage";
+        let window = self.client.profile_start().map_err(|e| self.failed(DOING, &e))?;
         launch();
-        let time = self.client.profile_end(window).map_err(|e| failed(reason(&e)))?;
+        let time = self.client.profile_end(window).map_err(|e| self.failed(DOING, &e))?;
         cubecl::future::block_on(time.resolve())
             .map(|ticks| ticks.duration())
-            .ok_or_else(|| failed("the device gave no time".into()))
+            .ok_or_else(|| self.failed(DOING, &"the device gave no time"))
     }
 
     /// Waits for all earlier launches, and reads the first `count` elements of a buffer.
@@ -342,11 +338,7 @@ impl Device {
         }
         let unread = buffer.bytes.saturating_sub(bytes) as u64;
         let handle = buffer.handle.clone().offset_end(unread);
-        let read = self.client.read_one(handle).map_err(|e| GpuError::Device {
-            device: self.info.name.clone(),
-            doing: buffer.name,
-            reason: reason(&e),
-        })?;
+        let read = self.client.read_one(handle).map_err(|e| self.failed(buffer.name, &e))?;
         Ok(bytemuck::pod_collect_to_vec(&read[..bytes]))
     }
 }

@@ -109,17 +109,22 @@ fn a_call_that_fails_once_is_an_error_and_loses_nothing() {
     alone("a_call_that_fails_once_is_an_error_and_loses_nothing", each_call_once);
 }
 
+/// The number of calls that answers take once kernels are loaded, and these answers.
+fn calls_of(driver: &Driver, whole: impl Fn() -> Result<String, GpuError>) -> (u64, String) {
+    whole().expect("nothing fails");
+    driver.fail(0, 0, 0);
+    let answers = whole().expect("nothing fails");
+    (driver.fail(0, 0, 0), answers)
+}
+
 fn each_call_once(driver: &Driver, device: &Device) {
     let (scene, shape) = scene();
     let whole = || Held::new(device, &scene, &shape)?.answers(&scene);
     driver.fail(1, u64::MAX, OUT_OF_MEMORY);
     println!("{}", whole().expect_err("no memory"));
     driver.fail(0, 0, 0);
-    // Kernels are loaded now.
-    let expected = whole().expect("nothing fails");
-    driver.fail(0, 0, 0);
-    whole().expect("nothing fails");
-    let calls = of_the_day(1..=driver.fail(0, 0, 0));
+    let (calls, expected) = calls_of(driver, whole);
+    let calls = of_the_day(1..=calls);
     let mut errors = 0;
     for call in &calls {
         driver.fail(*call, *call, OUT_OF_MEMORY);
@@ -156,10 +161,8 @@ fn a_device_that_is_lost_is_an_error_from_any_call_on() {
 fn each_call_for_good(driver: &Driver, device: &Device) {
     let (scene, shape) = scene();
     let whole = || Held::new(device, &scene, &shape)?.answers(&scene);
-    whole().expect("nothing fails");
-    driver.fail(0, 0, 0);
-    whole().expect("nothing fails");
-    for call in of_the_day(1..=driver.fail(0, 0, 0)) {
+    let (calls, _) = calls_of(driver, whole);
+    for call in of_the_day(1..=calls) {
         driver.fail(call, u64::MAX, LAUNCH_FAILED);
         let result = whole();
         let failed = driver.failed();

@@ -1,5 +1,6 @@
 //! A chain of light links holds a heavy end.
 
+use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Dynamics, Summary, System};
 
@@ -46,12 +47,17 @@ fn without_contacts_the_chain_falls_apart() {
     assert_eq!(summary.passed, Some(false), "{summary:?}");
 }
 
+/// The engine of a scene whose four bodies are in a chain of ball joints.
+fn jointed(bodies: &str) -> Newton {
+    let loaded = LoadedScene::parse(format!("{bodies}{BALL_JOINTS}"), "scene.toml").expect("a scene");
+    loaded.newton(loaded.system().expect("a system")).expect("an engine")
+}
+
 /// Bodies of 10 kg to 10 g in a chain of joints. Two of them begin in each other and in the floor.
 /// A solution that has not converged may be far off, and later ones were compared with it.
 #[test]
 fn a_chain_of_very_unequal_links_does_not_fly_off() {
-    let loaded = LoadedScene::parse(UNEQUAL.into(), "scene.toml").expect("a scene");
-    let mut engine = loaded.newton(loaded.system().expect("a system")).expect("an engine");
+    let mut engine = jointed(UNEQUAL);
     let energy = |system: &System| system.kinetic_energy() + system.potential_energy();
     let begin = energy(engine.system());
     for step in 0..40 {
@@ -67,15 +73,14 @@ fn a_chain_of_very_unequal_links_does_not_fly_off() {
 /// 1e23 m/s.
 #[test]
 fn joints_of_very_unequal_bodies_converge() {
-    let loaded = LoadedScene::parse(JOINTS.into(), "scene.toml").expect("a scene");
-    let mut engine = loaded.newton(loaded.system().expect("a system")).expect("an engine");
+    let mut engine = jointed(FREE);
     for step in 0..40 {
         let report = engine.step(5e-3).expect("a step");
         assert!(report.converged, "step {step}: {report:?}");
     }
 }
 
-const JOINTS: &str = r#"time_step = 0.005
+const FREE: &str = r#"time_step = 0.005
 duration = 0.2
 [[bodies]]
 name = "0"
@@ -109,21 +114,6 @@ translation = [-0.3, -0.3, 0.0]
 rotation = [-0.20894635634935882, -0.20894635634935882, -0.20894635634935882, -0.9322147072992253]
 velocity = [-5.0, -5.0, -5.0]
 angular_velocity = [-20.0, -20.0, -20.0]
-[[joints]]
-name = "joint 1"
-kind = "ball"
-parent = "0"
-child = "1"
-[[joints]]
-name = "joint 2"
-kind = "ball"
-parent = "1"
-child = "2"
-[[joints]]
-name = "joint 3"
-kind = "ball"
-parent = "2"
-child = "3"
 "#;
 
 const UNEQUAL: &str = r#"time_step = 0.005
@@ -173,7 +163,10 @@ translation = [-0.3, -0.3, 0.0]
 rotation = [-0.20894635634935882, -0.20894635634935882, -0.20894635634935882, -0.9322147072992253]
 velocity = [-5.0, -5.0, -5.0]
 angular_velocity = [-20.0, -20.0, -20.0]
-[[joints]]
+"#;
+
+/// Of four bodies.
+const BALL_JOINTS: &str = r#"[[joints]]
 name = "joint 1"
 kind = "ball"
 parent = "0"

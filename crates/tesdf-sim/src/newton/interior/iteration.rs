@@ -14,8 +14,8 @@ use crate::newton::linear::{BlockMatrix, Factor};
 /// method of multipliers: Rockafellar, *Augmented Lagrangians and applications of the proximal
 /// point algorithm*, Math. Oper. Res. 1976). What they leave is the same. With the 1e-13 of rigid
 /// rows in the matrix, rounding was as great as the numbers: the iterations for three joints from
-/// 10 kg to 10 g, a linear problem, grew to 1e23 m/s, or took up to 100 in place of 3. From 1e-12
-/// to 1e-7 they take as few.
+/// 10 kg to 10 g, a linear problem, grew to 1e23 m/s, or took up to 100. A step of that scene took
+/// 631 of them, with 1e-12 63, and from 1e-9 to 1e-7 47.
 const PROXIMAL: f64 = 1e-9;
 /// Lagged limits stay once the root of ν is below this gap, m.
 const FREEZE: f64 = 1e-5;
