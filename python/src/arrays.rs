@@ -20,12 +20,15 @@ impl<'py> Rows<'py> {
     /// # Errors
     /// `ValueError` names the argument and the shape that was found.
     pub fn new(name: &str, any: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let array = floats(name, any)?;
+        Self::of(name, &floats(name, any)?, "shape (N, 3)")
+    }
+
+    fn of(name: &str, array: &Bound<'py, PyAny>, expected: &str) -> PyResult<Self> {
         match array.extract::<PyReadonlyArray2<'py, f64>>() {
             Ok(rows) if rows.shape()[1] == 3 => Ok(Self(rows)),
             _ => {
                 let shape = array.getattr("shape")?;
-                Err(argument(name, format!("an array of shape {shape}"), "shape (N, 3)"))
+                Err(argument(name, format!("an array of shape {shape}"), expected))
             }
         }
     }
@@ -33,6 +36,35 @@ impl<'py> Rows<'py> {
     /// The rows as a slice.
     pub fn as_slice(&self) -> PyResult<&[DVec3]> {
         Ok(bytemuck::cast_slice(self.0.as_slice()?))
+    }
+}
+
+/// Points `[N, 3]`, or one point `[3]`.
+pub struct Points<'py> {
+    rows: Rows<'py>,
+    is_one: bool,
+}
+
+impl<'py> Points<'py> {
+    /// As [`Rows::new`] for the argument `points`.
+    ///
+    /// # Errors
+    /// Those of [`Rows::new`].
+    pub fn new(any: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let array = floats("points", any)?;
+        let is_one = array.getattr("shape")?.eq((3,))?;
+        let array = if is_one { array.call_method1("reshape", (1, 3))? } else { array };
+        Ok(Self { rows: Rows::of("points", &array, "shape (N, 3) or (3,)")?, is_one })
+    }
+
+    /// The points as a slice.
+    pub fn as_slice(&self) -> PyResult<&[DVec3]> {
+        self.rows.as_slice()
+    }
+
+    /// What is answered, from an array with a row for each point: of one point, that row.
+    pub fn answered<T>(&self, rows: Bound<'py, T>) -> PyResult<Bound<'py, PyAny>> {
+        if self.is_one { rows.into_any().get_item(0) } else { Ok(rows.into_any()) }
     }
 }
 

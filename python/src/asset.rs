@@ -16,9 +16,10 @@ use tesdf::inspect::{InspectOptions, inspect};
 use tesdf::query::{Answer, AnswerColumns, BatchError, Extent, Precision};
 use tesdf::verify::{VerifyOptions, verify};
 
-use crate::arrays::{self, Rows};
+use crate::arrays::{self, Points, Rows};
 use crate::errors::{Error, argument};
 use crate::interrupt::cancellable;
+use crate::whole;
 use crate::{classes, device, pool};
 
 /// Number of points between two checks for Python's signals: less than a second of work.
@@ -27,7 +28,7 @@ const CHUNK: usize = 1 << 19;
 /// An encoded mesh with exact signed distances, closest points and gradients. encode makes it, open
 /// reads it from a file. It is immutable: methods that move its vertices return another asset.
 ///
-/// All lengths are in the mesh's unit. Points are arrays [N, 3]; contiguous float64 arrays are read
+/// All lengths are in the mesh's unit. Points are arrays [N, 3], or one point [3]; contiguous float64 arrays are read
 /// in place. Queries run on all cores (RAYON_NUM_THREADS sets the number of threads) and release
 /// the interpreter's lock.
 #[pyclass(frozen, module = "tesdf")]
@@ -74,8 +75,8 @@ impl Asset {
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = points.py();
         let precision = named(precision)?;
-        let points = Rows::new("points", points)?;
-        let points = points.as_slice()?;
+        let asked = Points::new(points)?;
+        let points = asked.as_slice()?;
         let rows = points.len();
         let distance = PyArray1::<f64>::zeros(py, rows, false);
         let [gradient, closest] = [(); 2].map(|()| PyArray2::<f64>::zeros(py, [rows, 3], false));
@@ -95,7 +96,12 @@ impl Asset {
                 self.inner.query_batch_into(&points[at], precision, extent, columns)
             })?;
         }
-        classes::answers(py)?.call1((distance, gradient, closest, face))
+        classes::answers(py)?.call1((
+            asked.answered(distance)?,
+            asked.answered(gradient)?,
+            asked.answered(closest)?,
+            asked.answered(face)?,
+        ))
     }
 
     fn section<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -172,7 +178,8 @@ impl Asset {
         written.map_err(|e| Error::ExportJson(path, e).raise(py))
     }
 
-    /// Signed distance, gradient, closest point and face for each of the points [N, 3].
+    /// Signed distance, gradient, closest point and face for each of the points [N, 3]. Of one point
+    /// [3], answers have no axis of points; a device takes [N, 3] only.
     ///
     /// With precision "f64" the mesh is used as given, and exact predicates decide the signs. "f32"
     /// is several times faster and exact to 1e-6 of the diagonal. A point that is not finite gets
@@ -208,17 +215,17 @@ impl Asset {
         self.answers(points, precision, Extent::Domain)
     }
 
-    /// Only the signed distances [N], negative inside.
+    /// Only the signed distances [N], negative inside; of one point [3] a number.
     #[pyo3(signature = (points, precision = "f64"))]
     fn signed_distance<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
         precision: &str,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    ) -> PyResult<Bound<'py, PyAny>> {
         let precision = named(precision)?;
-        let points = Rows::new("points", points)?;
-        let points = points.as_slice()?;
+        let asked = Points::new(points)?;
+        let points = asked.as_slice()?;
         let found = PyArray1::zeros(py, points.len(), false);
         {
             let mut found = found.try_readwrite()?;
@@ -227,18 +234,14 @@ impl Asset {
                 self.inner.signed_distances_into(&points[at.clone()], precision, &mut found[at])
             })?;
         }
-        Ok(found)
+        asked.answered(found)
     }
 
-    /// Whether each of the points [N, 3] is inside, by exact predicates. Points on the surface may
-    /// count as inside or outside.
-    fn is_inside<'py>(
-        &self,
-        py: Python<'py>,
-        points: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let points = Rows::new("points", points)?;
-        let points = points.as_slice()?;
+    /// Whether each of the points [N, 3] is inside, by exact predicates; of one point [3] a truth
+    /// value. Points on the surface may count as inside or outside.
+    fn is_inside<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let asked = Points::new(points)?;
+        let points = asked.as_slice()?;
         let found = PyArray1::zeros(py, points.len(), false);
         {
             let mut found = found.try_readwrite()?;
@@ -249,7 +252,7 @@ impl Asset {
                 Ok(())
             })?;
         }
-        Ok(found)
+        asked.answered(found)
     }
 
     /// The first face that each ray meets, from either side: RayHits(t, point, face, normal).
@@ -356,7 +359,11 @@ impl Asset {
     ///
     /// Raises AssetError if the file is damaged. Wrong answers are in the report.
     #[pyo3(signature = (samples = 10_000))]
-    fn verify<'py>(&self, py: Python<'py>, samples: u32) -> PyResult<Bound<'py, PyAny>> {
+    fn verify<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole::samples)] samples: u32,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         let options = VerifyOptions { samples: samples as usize, ..VerifyOptions::default() };
         let cancelled = AtomicBool::new(false);

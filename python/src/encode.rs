@@ -16,6 +16,7 @@ use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::abandonable;
 use crate::mesh::MeshInput;
 use crate::pool;
+use crate::whole::integer;
 
 /// Encodes a closed mesh. Ctrl-C ends it with KeyboardInterrupt.
 ///
@@ -152,9 +153,9 @@ impl<'py> Keywords<'py> {
                 choices.domain = given(value).map(domain_choice).transpose()?.unwrap_or_default();
             }
             "encoder" => choices.encoder = given(value).map(|any| named(name, any)).transpose()?,
-            "resolution" => choices.resolution = typed(name, value)?,
+            "resolution" => choices.resolution = integer(name, value)?,
             "threshold" => choices.threshold = given(value).map(length_or_safe).transpose()?,
-            "e_max" => choices.e_max = typed(name, value)?,
+            "e_max" => choices.e_max = integer(name, value)?,
             "deformable" => {
                 choices.deformation = match typed(name, value)? {
                     true => Deformation::Expected,
@@ -169,7 +170,7 @@ impl<'py> Keywords<'py> {
             "thickness" => choices.thickness = typed(name, value)?,
             "surface" => choices.surface = named(name, value)?,
             "repair" => self.repair = repair_mode(typed(name, value)?)?,
-            "threads" => self.threads = typed(name, value)?,
+            "threads" => self.threads = integer(name, value)?,
             "progress" => self.progress = given(value).cloned(),
             _ => {
                 let text = format!("encode() got an unexpected keyword argument '{name}'");

@@ -31,6 +31,7 @@ mod scene;
 mod settings;
 mod shapes;
 mod simulation;
+mod whole;
 mod why_report;
 mod wording;
 mod worlds;

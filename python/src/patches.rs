@@ -8,6 +8,7 @@ use tesdf::collide::{self, ContactPatches, PatchOptions};
 use crate::contacts::{Columns, contacts_of};
 use crate::errors::Error;
 use crate::scene::Scene;
+use crate::whole;
 
 /// Groups the contacts of each detection into patches: regions in which two bodies touch. Patches
 /// and points keep their ids from detection to detection.
@@ -29,7 +30,12 @@ pub struct PatchTracker {
 impl PatchTracker {
     #[new]
     #[pyo3(signature = (*, angle = 30f64.to_radians(), link = None, points = 4), text_signature = "(*, angle=0.5235987755982988, link=None, points=4)")]
-    fn new(py: Python<'_>, angle: f64, link: Option<f64>, points: usize) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        angle: f64,
+        link: Option<f64>,
+        #[pyo3(from_py_with = whole::points)] points: usize,
+    ) -> PyResult<Self> {
         let link = link.map_or(PatchOptions::default().link, Length::Absolute);
         let tracker = collide::PatchTracker::new(PatchOptions { angle, link, points });
         Ok(Self { inner: Mutex::new(tracker.map_err(|e| Error::Collide(e).raise(py))?) })

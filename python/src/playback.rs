@@ -2,10 +2,11 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use pyo3::prelude::*;
 use tesdf::Progress;
+use tesdf::base::Named;
 use tesdf::save::{Destination, SaveError, SaveOptions};
 use tesdf_playback::{Arrows, ContactOptions, Frames, GlbOptions, Playback, glb, page};
 use tesdf_sim::scene_file::{AssetCache, LoadedScene};
@@ -15,8 +16,9 @@ use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::cancellable;
 use crate::pool;
 use crate::simulation::{RecordedRun, Simulation};
+use crate::whole;
 
-// A constant in a signature would be "..." for readers in Python.
+// The docstring of `tesdf.view` has the number.
 const _: () = assert!(ContactOptions::MOST == 128);
 
 /// Writes a run as an animated GLB file, which Blender, three.js and others play.
@@ -41,64 +43,76 @@ pub fn export(
     py: Python<'_>,
     run: &Bound<'_, PyAny>,
     path: PathBuf,
-    every: Option<NonZeroUsize>,
+    #[pyo3(from_py_with = whole::every)] every: Option<NonZeroUsize>,
     fps: Option<f64>,
     speed: f64,
     geometries: Option<BTreeMap<String, PathBuf>>,
 ) -> PyResult<()> {
     let frames = frames(every, fps)?;
-    write(py, run, geometries, &path, |source, _| {
+    write(py, run, geometries, &path, None, |source, _| {
         let run = Playback::new(&source.record, &source.system, frames).map_err(Error::Playback)?;
         glb(&run, &GlbOptions { speed }).map_err(Error::Playback)
     })
 }
 
-/// Writes a page that plays a run in a browser, with its contacts. The page is one file that needs
-/// no server and asks for nothing.
+/// Writes the page of tesdf.view to a file, with its arguments.
 ///
-/// - run: the path of a run of `tesdf simulate` or Simulation.save, a Simulation, whose steps so far
-///   are taken, or a Record.
-/// - path: the file.
-/// - every: every N-th step and the last one are played. fps: the steps nearest to this many times
-///   in each second of the run. Without both, at most 1000 steps are.
-/// - contacts: at most this many contacts of a frame are drawn, the deepest ones of each place.
-///   Contacts that the run has not recorded are detected again, which Ctrl-C ends.
-/// - title: heading of the page; None is the name of the run.
-/// - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-///   paths. Not for a Simulation or Record, which has its meshes.
-///
-/// The same run gives the bytes of `tesdf view`.
-///
-/// Raises OSError if a file cannot be read or written, SceneError if a mesh is missing, and
-/// SimulationError if the run cannot be played.
+/// - contacts: None are those that the run has recorded, where it has those of all frames but the
+///   last, else none.
+/// - in_notebook: without every and fps, at most 300 steps are played, if possible at those whose
+///   contacts are recorded.
 #[pyfunction]
 #[pyo3(signature = (
-    run, path, *, every = None, fps = None, contacts = 128, title = None, geometries = None
+    run, path, *, every = None, fps = None, contacts = None, title = None, geometries = None, progress = None,
+    in_notebook = false
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn view(
     py: Python<'_>,
     run: &Bound<'_, PyAny>,
     path: PathBuf,
-    every: Option<NonZeroUsize>,
+    #[pyo3(from_py_with = whole::every)] every: Option<NonZeroUsize>,
     fps: Option<f64>,
-    contacts: usize,
+    #[pyo3(from_py_with = whole::contacts)] contacts: Option<usize>,
     title: Option<String>,
     geometries: Option<BTreeMap<String, PathBuf>>,
+    progress: Option<&Bound<'_, PyAny>>,
+    in_notebook: bool,
 ) -> PyResult<()> {
+    let is_chosen = every.is_some() || fps.is_some();
     let frames = frames(every, fps)?;
-    write(py, run, geometries, &path, |source, stop| {
+    write(py, run, geometries, &path, progress, |source, watch| {
         let Source { record, system, loaded, name, .. } = source;
+        let frames = if in_notebook && !is_chosen { of_notebook(record) } else { frames };
         let run = Playback::new(record, system, frames).map_err(Error::Playback)?;
-        let most = contacts;
-        let detection = loaded.detection(system).filter(|_| most > 0);
-        let options = ContactOptions { detection, most };
+        let detects = contacts.map_or_else(|| run.has_recorded_contacts(), |most| most > 0);
+        let most = contacts.unwrap_or(ContactOptions::MOST);
+        let options = ContactOptions { detection: loaded.detection(system).filter(|_| detects), most };
         let forces = run.forces(most);
-        let contacts = run.contacts(system, &options, stop, |_| {}).map_err(Error::Playback)?;
+        let done = |frames: usize| watch.frames(frames, run.steps.len());
+        let contacts = run.contacts(system, &options, &watch.stop, done).map_err(Error::Playback)?;
         let title = title.as_deref().unwrap_or(name);
         let arrows = Arrows { contacts: contacts.as_deref(), forces: forces.as_deref() };
         Ok(page(&run, arrows, title).map_err(Error::Playback)?.into_bytes())
     })
+}
+
+/// Notebooks keep what they show, so a page in one has fewer states than a file.
+const OF_NOTEBOOK: usize = 300;
+/// Fewest states at which the contacts of a run are recorded for a notebook to play them alone.
+const FEWEST: u64 = 50;
+
+/// The frames of a notebook: at most [`OF_NOTEBOOK`], and those with recorded contacts where there
+/// are enough of them.
+fn of_notebook(record: &RunRecord) -> Frames {
+    let last = record.times().len().saturating_sub(1);
+    let every = last.div_ceil(OF_NOTEBOOK).max(1);
+    let mut recorded = record.contacts().map(|(step, _)| step);
+    let between = match (recorded.next(), recorded.next()) {
+        (Some(first), Some(second)) if (second - first) * FEWEST <= last as u64 => (second - first) as usize,
+        _ => 1,
+    };
+    Frames::Every(NonZeroUsize::new(every.next_multiple_of(between)).unwrap_or(NonZeroUsize::MIN))
 }
 
 fn frames(every: Option<NonZeroUsize>, fps: Option<f64>) -> PyResult<Frames> {
@@ -107,6 +121,39 @@ fn frames(every: Option<NonZeroUsize>, fps: Option<f64>) -> PyResult<Frames> {
         (None, Some(rate)) => Ok(Frames::PerSecond(rate)),
         (None, None) => Ok(Frames::default()),
         (Some(_), Some(_)) => Err(argument("every", "fps is given, too", "one of both")),
+    }
+}
+
+/// How far a file is, and the request to stop.
+#[derive(Default)]
+struct Watch {
+    /// Of the mesh that is encoded.
+    encoding: Progress,
+    stop: AtomicBool,
+    /// Frames whose contacts are found, and the number of frames; 0 before the first.
+    found: [AtomicUsize; 2],
+}
+
+impl Watch {
+    fn frames(&self, found: usize, of: usize) {
+        self.found[0].store(found, Ordering::Relaxed);
+        self.found[1].store(of, Ordering::Relaxed);
+    }
+
+    /// The stage, and its share.
+    fn state(&self) -> (&'static str, f64) {
+        match [0, 1].map(|k| self.found[k].load(Ordering::Relaxed)) {
+            [_, 0] => {
+                let (stage, share) = self.encoding.state();
+                (stage.name(), share)
+            }
+            [found, of] => ("contacts", found as f64 / of as f64),
+        }
+    }
+
+    fn cancel(&self) {
+        self.encoding.cancel();
+        self.stop.store(true, Ordering::Relaxed);
     }
 }
 
@@ -152,10 +199,11 @@ fn write(
     run: &Bound<'_, PyAny>,
     geometries: Option<BTreeMap<String, PathBuf>>,
     path: &Path,
-    make: impl FnOnce(&Source, &AtomicBool) -> Result<Vec<u8>, Error> + Send,
+    progress: Option<&Bound<'_, PyAny>>,
+    make: impl FnOnce(&Source, &Watch) -> Result<Vec<u8>, Error> + Send,
 ) -> PyResult<()> {
     let pool = pool::shared().map_err(|e| e.raise(py))?;
-    let (progress, stop) = (Progress::default(), AtomicBool::new(false));
+    let watch = Watch::default();
     let simulation = run.cast::<Simulation>().ok().map(|simulation| simulation.get());
     // Of a Record.
     let recorded = run.getattr("_run").and_then(|run| Ok(run.cast_into::<RecordedRun>()?)).ok();
@@ -178,18 +226,17 @@ fn write(
                 (None, Some(RecordedRun { record, system })) => {
                     Source::of_simulation(record.clone(), system.clone())?
                 }
-                (None, None) => Source::open(&file.unwrap_or_default(), &geometries, &progress)?,
+                (None, None) => Source::open(&file.unwrap_or_default(), &geometries, &watch.encoding)?,
             };
             let inputs: Vec<&Path> = source.inputs.iter().map(PathBuf::as_path).collect();
             let refused = |e: SaveError| Error::Record(path.to_path_buf(), e.into());
             let options = SaveOptions { inputs: &inputs, ..SaveOptions::default() };
             let output = Destination::new(path, &options).map_err(refused)?;
-            output.write(&make(&source, &stop)?).map_err(refused)
+            output.write(&make(&source, &watch)?).map_err(refused)
         })
     };
-    let cancel = || {
-        progress.cancel();
-        stop.store(true, Ordering::Relaxed);
-    };
-    cancellable(py, work, cancel, || Ok(()))?.map_err(|e| e.raise(py))
+    let tell = || progress.map_or(Ok(()), |progress| progress.call1(watch.state()).map(drop));
+    cancellable(py, work, || watch.cancel(), tell)?.map_err(|e| e.raise(py))?;
+    watch.frames(1, 1);
+    tell()
 }

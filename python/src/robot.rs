@@ -22,6 +22,7 @@ use crate::errors::{Error, argument};
 use crate::interrupt::cancellable;
 use crate::poses::{Count, of_pose, poses};
 use crate::settings::shaped;
+use crate::whole;
 use crate::{arrays, pool, shapes};
 
 /// Rows between two looks at Ctrl-C.
@@ -269,7 +270,7 @@ impl Robot {
         py: Python<'py>,
         q: &Bound<'py, PyAny>,
         tolerance: f64,
-        threads: Option<NonZeroUsize>,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<NonZeroUsize>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (dof, q) = (self.dof(), Rows::new("q", q, self.dof())?);
         let rows = q.rows()?;
@@ -319,7 +320,7 @@ impl Robot {
         q: &Bound<'py, PyAny>,
         bound: f64,
         tolerance: f64,
-        threads: Option<NonZeroUsize>,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<NonZeroUsize>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let q = Rows::new("q", q, self.dof())?;
         let rows = q.rows()?;
@@ -342,7 +343,7 @@ impl Robot {
         py: Python<'py>,
         q: &Bound<'py, PyAny>,
         tolerance: f64,
-        threads: Option<NonZeroUsize>,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<NonZeroUsize>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         self.are_clearances_below(py, q, 0.0, tolerance, threads)
     }
@@ -363,7 +364,7 @@ impl Robot {
         q1: &Bound<'py, PyAny>,
         margin: f64,
         tolerance: f64,
-        steps: u32,
+        #[pyo3(from_py_with = whole::steps)] steps: u32,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (from, to) = (numbers("q0", q0)?, numbers("q1", q1)?);
         let options = motion_options(margin, tolerance, steps);
@@ -396,8 +397,8 @@ impl Robot {
         q1: &Bound<'py, PyAny>,
         margin: f64,
         tolerance: f64,
-        steps: u32,
-        threads: Option<NonZeroUsize>,
+        #[pyo3(from_py_with = whole::steps)] steps: u32,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<NonZeroUsize>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (from, to) = (Rows::new("q0", q0, self.dof())?, Rows::new("q1", q1, self.dof())?);
         let (from, to) = (from.rows()?, to.rows()?);

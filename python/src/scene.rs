@@ -20,6 +20,7 @@ use crate::instance_columns::{InstanceColumns, PerInstance};
 use crate::interrupt::cancellable;
 use crate::pairs::{self, Motions, pairs_of};
 use crate::poses::{self, Count};
+use crate::whole;
 use crate::{classes, pool, shapes};
 
 /// Shapes, and instances of them with poses; detect finds the contacts.
@@ -93,7 +94,7 @@ impl Scene {
     }
 
     /// Removes a shape that no instance uses.
-    fn remove_shape(&self, py: Python<'_>, shape: u32) -> PyResult<()> {
+    fn remove_shape(&self, py: Python<'_>, #[pyo3(from_py_with = whole::shape)] shape: u32) -> PyResult<()> {
         self.change(py, |scene| scene.remove_shape(ShapeId(shape)).map(|_| ()))
     }
 
@@ -112,7 +113,7 @@ impl Scene {
     fn add<'py>(
         &self,
         py: Python<'py>,
-        shape: u32,
+        #[pyo3(from_py_with = whole::shape)] shape: u32,
         pose: Option<&Bound<'py, PyAny>>,
         velocity: Option<&Bound<'py, PyAny>>,
         scale: Option<&Bound<'py, PyAny>>,
@@ -399,8 +400,8 @@ impl Scene {
     fn clearance<'py>(
         &self,
         py: Python<'py>,
-        a: u32,
-        b: u32,
+        #[pyo3(from_py_with = whole::a)] a: u32,
+        #[pyo3(from_py_with = whole::b)] b: u32,
         tolerance: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let mut options = ClearanceOptions::default();
@@ -447,15 +448,15 @@ impl Scene {
     fn time_of_impact<'py>(
         &self,
         py: Python<'py>,
-        a: u32,
-        b: u32,
+        #[pyo3(from_py_with = whole::a)] a: u32,
+        #[pyo3(from_py_with = whole::b)] b: u32,
         velocity_a: Option<&Bound<'py, PyAny>>,
         velocity_b: Option<&Bound<'py, PyAny>>,
         screw_a: Option<&Bound<'py, PyAny>>,
         screw_b: Option<&Bound<'py, PyAny>>,
         end: f64,
         tolerance: Option<&Bound<'py, PyAny>>,
-        iterations: u32,
+        #[pyo3(from_py_with = whole::iterations)] iterations: u32,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
         let mut options = TimeOfImpactOptions { end, iterations, ..TimeOfImpactOptions::default() };
         options.tolerance = detection::tolerance(tolerance, options.tolerance)?;
@@ -491,7 +492,7 @@ impl Scene {
         screws_b: Option<&Bound<'py, PyAny>>,
         end: f64,
         tolerance: Option<&Bound<'py, PyAny>>,
-        iterations: u32,
+        #[pyo3(from_py_with = whole::iterations)] iterations: u32,
     ) -> PyResult<Bound<'py, PyAny>> {
         let mut options = TimeOfImpactOptions { end, iterations, ..TimeOfImpactOptions::default() };
         options.tolerance = detection::tolerance(tolerance, options.tolerance)?;
@@ -510,9 +511,9 @@ impl Scene {
     fn why<'py>(
         &self,
         py: Python<'py>,
-        a: u32,
-        b: u32,
-        part: Option<u32>,
+        #[pyo3(from_py_with = whole::a)] a: u32,
+        #[pyo3(from_py_with = whole::b)] b: u32,
+        #[pyo3(from_py_with = whole::part)] part: Option<u32>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let Keywords { options, .. } = Keywords::new("why", options)?;

@@ -23,6 +23,7 @@ use crate::interrupt::{POLL, cancellable};
 use crate::opening::{Opened, Replaced, Source};
 use crate::poses::{Count, of_pose, of_velocity, poses, velocities};
 use crate::settings::{self, index_of, rows_of, shaped};
+use crate::whole;
 use crate::{classes, forces, pool};
 
 /// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and
@@ -249,7 +250,7 @@ impl Simulation {
         mode: Option<&Bound<'_, PyAny>>,
         time_step: Option<f64>,
         duration: Option<f64>,
-        threads: Option<NonZeroUsize>,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<NonZeroUsize>,
         device: Option<&Bound<'_, PyAny>>,
         history: bool,
     ) -> PyResult<Self> {
@@ -274,7 +275,7 @@ impl Simulation {
     ///
     /// Raises SimulationError if a step fails. The steps before it remain.
     #[pyo3(signature = (count = 1))]
-    fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
+    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole::count)] count: u64) -> PyResult<()> {
         self.advance(py, Some(count), None)
     }
 

@@ -1,8 +1,9 @@
 //! Messages of the library in Python's terms: it speaks of the tool's commands and flags.
 
 /// What the library says outside of code, and what Python has in its place.
-const PHRASES: [(&str, &str); 7] = [
+const PHRASES: [(&str, &str); 8] = [
     ("tesdf encode MESH -o FILE.tesdf", "tesdf.encode(mesh).save(\"FILE.tesdf\")"),
+    ("`tesdf simulate` writes runs", "Simulation.save writes runs"),
     ("that tesdf encode wrote", "that Asset.save wrote"),
     ("encode the mesh without --unit", "encode the mesh without unit"),
     ("The repair `auto`", "`repair=\"auto\"`"),

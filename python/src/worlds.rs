@@ -19,6 +19,7 @@ use crate::opening::{Opened, Replaced, Source};
 use crate::poses::{columns, of_twist, poses_of};
 use crate::settings::{self, index_of, rows_of, shaped};
 use crate::simulation::Snapshot;
+use crate::whole;
 use crate::{arrays, forces, pool};
 
 /// Many worlds of a scene, for control and learning: all threads step them, on the processor. What
@@ -185,10 +186,10 @@ impl Worlds {
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,
-        count: usize,
+        #[pyo3(from_py_with = whole::count)] count: usize,
         mode: Option<&Bound<'_, PyAny>>,
         time_step: Option<f64>,
-        threads: Option<NonZeroUsize>,
+        #[pyo3(from_py_with = whole::threads)] threads: Option<NonZeroUsize>,
     ) -> PyResult<Self> {
         if count == 0 {
             return Err(argument("count", count, "a number of worlds, 1 or more"));
@@ -215,7 +216,7 @@ impl Worlds {
     /// Raises SimulationError if a step of a world fails. That world stays as it was before the
     /// step; the others make theirs.
     #[pyo3(signature = (count = 1))]
-    fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
+    fn step(&self, py: Python<'_>, #[pyo3(from_py_with = whole::count)] count: u64) -> PyResult<()> {
         let mut left = count;
         while left > 0 {
             // For as long as a signal may wait.
@@ -540,7 +541,11 @@ impl Worlds {
     }
 
     /// The forces of the contacts of a world that push: ContactForces.
-    fn contact_forces<'py>(&self, py: Python<'py>, world: usize) -> PyResult<Bound<'py, PyAny>> {
+    fn contact_forces<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole::world)] world: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let world = self.one(py, world)?;
         let found = self.read(py, |worlds| forces_of(&worlds[world]).map(|forces| forces.contacts.clone()));
         forces::of_contacts(py, &found.unwrap_or_default())
@@ -548,14 +553,22 @@ impl Worlds {
 
     /// What the steps of a world since its beginning did not do as its scene asks, in lines for
     /// users, as in Simulation.warnings. Overlaps are those of now, and are measured for this.
-    fn warnings(&self, py: Python<'_>, world: usize) -> PyResult<Vec<String>> {
+    fn warnings(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::world)] world: usize,
+    ) -> PyResult<Vec<String>> {
         let world = self.one(py, world)?;
         let warnings = self.read(py, |worlds| worlds[world].warnings());
         Ok(warnings.into_iter().map(|warning| warning.message).collect())
     }
 
     /// The contacts of a world at the beginning of the last step: StepContacts.
-    fn contacts<'py>(&self, py: Python<'py>, world: usize) -> PyResult<Bound<'py, PyAny>> {
+    fn contacts<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole::world)] world: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let world = self.one(py, world)?;
         let (found, hidden) = self.read(py, |worlds| {
             let engine = worlds[world].engine();

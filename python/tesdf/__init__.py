@@ -47,7 +47,7 @@
     simulation.run()["passed"]                          # to the end; the summary, with the criteria
     moment = simulation.snapshot()                      # restore(moment), reset, copy; set_mass, set_friction, ...
     worlds = tesdf.Worlds("scene.toml", 256)            # arrays [256, ...]; worlds.step(), worlds.reset(done)
-    tesdf.view(simulation, "page.html")                 # plays it in a browser; tesdf.export for GLB and rerun
+    tesdf.view(simulation)                              # plays it in a browser; tesdf.export for GLB and rerun
 
 All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
 (`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError`,
@@ -72,7 +72,6 @@ from ._native import (
     encode,
     import_json,
     repair,
-    view,
 )
 from .bodies import clearance, collide, time_of_impact, why
 from .contacts import (
@@ -104,7 +103,7 @@ from .errors import (
 )
 from .managers import CollisionManager, ContactData, DistanceData
 from .planning import MotionCheck, MotionChecks, RobotClearance, RobotClearances
-from .playback import LiveView, export
+from .playback import LiveView, Page, export, view
 from .queries import closest_point, contains, signed_distance
 from .reports import (
     CheckReport,
@@ -163,6 +162,7 @@ __all__ = [
     "MotionChecks",
     "Moved",
     "NotSolidError",
+    "Page",
     "PatchTracker",
     "Plane",
     "RayHits",

@@ -265,7 +265,8 @@ class Asset:
         file cannot be written."""
     @overload
     def query(self, points: DeviceArray, precision: _Precision = "f64", *, device: _Device = "cpu") -> DeviceAnswers:
-        """Signed distance, gradient, closest point and face for each of the points [N, 3].
+        """Signed distance, gradient, closest point and face for each of the points [N, 3]. Of one point
+        [3], answers have no axis of points; a device takes [N, 3] only.
 
         With precision "f64" the mesh is used as given, and exact predicates decide the signs. "f32"
         is several times faster and exact to 1e-6 of the diagonal. A point that is not finite gets
@@ -283,10 +284,10 @@ class Asset:
         """As query, but with NaN and NO_FACE for points outside of the encoded domain. The domain ends
         at the width of the band from the solid, up to about the size of a cell."""
     def signed_distance(self, points: npt.ArrayLike, precision: _Precision = "f64") -> npt.NDArray[np.float64]:
-        """Only the signed distances [N], negative inside."""
+        """Only the signed distances [N], negative inside; of one point [3] a number."""
     def is_inside(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether each of the points [N, 3] is inside, by exact predicates. Points on the surface may
-        count as inside or outside."""
+        """Whether each of the points [N, 3] is inside, by exact predicates; of one point [3] a truth
+        value. Points on the surface may count as inside or outside."""
     def ray_cast(self, origins: npt.ArrayLike, directions: npt.ArrayLike, limit: float = ...) -> RayHits:
         """The first face that each ray meets, from either side: RayHits(t, point, face, normal).
 
@@ -1146,28 +1147,18 @@ def view(
     *,
     every: int | None = None,
     fps: float | None = None,
-    contacts: int = 128,
+    contacts: int | None = None,
     title: str | None = None,
     geometries: Mapping[str, _Path] | None = None,
+    progress: Callable[[str, float], object] | None = None,
+    in_notebook: bool = False,
 ) -> None:
-    """Writes a page that plays a run in a browser, with its contacts. The page is one file that needs
-    no server and asks for nothing.
+    """Writes the page of tesdf.view to a file, with its arguments.
 
-    - run: the path of a run of `tesdf simulate` or Simulation.save, a Simulation, whose steps so far
-      are taken, or a Record.
-    - path: the file.
-    - every: every N-th step and the last one are played. fps: the steps nearest to this many times
-      in each second of the run. Without both, at most 1000 steps are.
-    - contacts: at most this many contacts of a frame are drawn, the deepest ones of each place.
-      Contacts that the run has not recorded are detected again, which Ctrl-C ends.
-    - title: heading of the page; None is the name of the run.
-    - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-      paths. Not for a Simulation or Record, which has its meshes.
-
-    The same run gives the bytes of `tesdf view`.
-
-    Raises OSError if a file cannot be read or written, SceneError if a mesh is missing, and
-    SimulationError if the run cannot be played."""
+    - contacts: None are those that the run has recorded, where it has those of all frames but the
+      last, else none.
+    - in_notebook: without every and fps, at most 300 steps are played, if possible at those whose
+      contacts are recorded."""
 def pair(a: Body, b: Body, pose_a: npt.ArrayLike | None, pose_b: npt.ArrayLike | None) -> Scene:
     """A scene of two bodies, as the instances 0 and 1.
 

@@ -79,8 +79,10 @@ class _Table(_Rows):
 
     def to_dataframe(self) -> Any:
         """The columns of `to_dict` as a `pandas.DataFrame`; needs pandas."""
-        import pandas
-
+        try:
+            import pandas
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError("to_dataframe needs pandas: pip install pandas", name=error.name) from error
         return pandas.DataFrame(self.to_dict())
 
     def _repr_html_(self) -> str:

@@ -3,6 +3,7 @@ show; messages in Python's terms."""
 
 import base64
 import re
+import sys
 import types
 import zlib
 
@@ -143,3 +144,35 @@ def test_threads_are_limited(torus):
     assert tesdf.encode(torus, "fast", threads=3).to_bytes() == tesdf.encode(torus, "fast").to_bytes()
     with pytest.raises(ValueError, match="threads: 1000000000; expected at most 1024"):
         tesdf.encode(torus, "fast", threads=10**9)
+
+
+def test_integers_out_of_range_name_their_argument(asset):
+    scene, worlds = tesdf.Scene(), tesdf.Worlds({"time_step": 1e-3, "duration": 1, "bodies": []}, 1)
+    refused = [
+        ("e_max", 0, lambda n: tesdf.encode(CUBE, e_max=n)),
+        ("resolution", -1, lambda n: tesdf.encode(CUBE, resolution=n)),
+        ("threads", 0, lambda n: tesdf.encode(CUBE, threads=n)),
+        ("samples", -1, asset.verify),
+        ("shape", -1, scene.remove_shape),
+        ("b", 2**32, lambda n: scene.clearance(0, n)),
+        ("iterations", -1, lambda n: scene.time_of_impact(0, 1, end=1.0, iterations=n)),
+        ("part", -1, lambda n: scene.why(0, 1, n)),
+        ("points", -1, lambda n: tesdf.PatchTracker(points=n)),
+        ("count", -1, worlds.step),
+        ("world", -1, worlds.contacts),
+        ("every", 0, lambda n: tesdf.view("run.tesrun", "page.html", every=n)),
+        ("contacts", -1, lambda n: tesdf.view("run.tesrun", "page.html", contacts=n)),
+        ("reduce", -1, lambda n: scene.detect(reduce=n)),
+    ]
+    for name, least, call in refused:
+        for value in (least, 2**70):
+            with pytest.raises(ValueError, match=rf"^{name}: {value}; expected an integer (from|greater than) [01]"):
+                call(value)
+    with pytest.raises(TypeError, match="^samples: float; expected an integer from 0 to"):
+        asset.verify(2.5)
+
+
+def test_a_table_without_pandas_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ModuleNotFoundError, match="pip install pandas"):
+        tesdf.collide(CUBE, CUBE, pose_b=[0.018, 0, 0, 0, 0, 0, 1]).to_dataframe()

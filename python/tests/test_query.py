@@ -63,6 +63,19 @@ def test_all_queries_agree(asset, points, truth):
         assert np.array_equal(a[within], b[within])
 
 
+def test_one_point(asset, points):
+    for point in (points[0], points[0].tolist(), tuple(points[0])):
+        for method in (asset.query, asset.query_in_domain):
+            answers, row = method(point), method(points[:1])
+            assert [x.shape for x in answers] == [(), (3,), (3,), ()] and isinstance(answers, type(row))
+            assert all(np.array_equal(one, rows[0], equal_nan=True) for one, rows in zip(answers, row))
+        assert asset.signed_distance(point) == tesdf.signed_distance(asset, point)
+        assert isinstance(asset.signed_distance(point, "f32"), float)
+        assert asset.is_inside(point) == tesdf.contains(asset, point) and asset.is_inside(point).shape == ()
+    # Three rows are three points.
+    assert asset.signed_distance(points[:3]).shape == (3,)
+
+
 def test_points_of_any_layout(asset, points):
     expected = asset.query(points).signed_distance
     wide = np.zeros((len(points), 5))
@@ -92,7 +105,8 @@ def test_points_that_are_not_finite(asset):
 
 
 @pytest.mark.parametrize("bad, text", [
-    ([1.0, 2.0, 3.0], r"points: an array of shape \(3,\); expected shape \(N, 3\)"),
+    ([1.0, 2.0], r"points: an array of shape \(2,\); expected shape \(N, 3\) or \(3,\)"),
+    (1.0, r"points: an array of shape \(\)"),
     (np.zeros((4, 2)), r"points: an array of shape \(4, 2\)"),
     (np.zeros((2, 4, 3)), r"points: an array of shape \(2, 4, 3\)"),
     ([["a", "b", "c"]], "points: an array of <U1; expected real numbers"),

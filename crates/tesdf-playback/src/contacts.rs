@@ -1,5 +1,5 @@
 //! The contacts of a run's frames.
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use tesdf::collide::{CollideError, CollideOptions, Contact, detect_until};
@@ -69,8 +69,7 @@ impl Playback<'_> {
         mut done: impl FnMut(usize),
     ) -> Result<Option<Vec<FrameContacts>>, PlaybackError> {
         let Some(detection) = &options.detection else { return Ok(None) };
-        let is_near = self.bounds.center().length() <= NEAR * self.diagonal();
-        let recorded: BTreeMap<u64, Vec<RecordedContact>> = match is_near {
+        let recorded: BTreeMap<u64, Vec<RecordedContact>> = match self.is_near() {
             true => self.record.contacts().collect(),
             false => BTreeMap::new(),
         };
@@ -97,6 +96,19 @@ impl Playback<'_> {
             done(frame + 1);
         }
         Ok(Some(frames))
+    }
+
+    /// Whether the run has recorded the contacts of all frames but the last one, whose step has none,
+    /// so that [`contacts`](Self::contacts) detects those of this one at most.
+    pub fn has_recorded_contacts(&self) -> bool {
+        let recorded: BTreeSet<u64> = self.record.contacts().map(|(step, _)| step).collect();
+        let others = &self.steps[..self.steps.len().saturating_sub(1)];
+        self.is_near() && !recorded.is_empty() && others.iter().all(|&step| recorded.contains(&(step as u64)))
+    }
+
+    /// Whether the run is so near to the origin that recorded points are precise.
+    fn is_near(&self) -> bool {
+        self.bounds.center().length() <= NEAR * self.diagonal()
     }
 
     fn of_record(

@@ -136,6 +136,7 @@ fn recorded_contacts_and_those_detected_again_agree() {
         empty.push(record.times()[step], &moved);
     }
     let bare = Playback::new(&empty, &system, Frames::default()).unwrap();
+    assert!(playback.has_recorded_contacts() && !bare.has_recorded_contacts());
     let again = contacts(&bare, &system, detection);
     assert_eq!(found.len(), playback.steps.len());
     assert!(found.iter().all(|frame| frame.found >= 4), "the box lies on four corners");
