@@ -41,6 +41,7 @@ in_release() {
         step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt &&
         step "MJWarp example" in_environment release $tests/unoptimised_kernels.py examples/python/mujoco_warp_nuts_on_bolts.py &&
         step "PyTorch example" in_environment release examples/python/peg_finds_hole.py &&
+        step "PyTorch example" in_environment release examples/python/grasps_without_collision.py &&
         step "OMPL example" in_environment release examples/python/plan_with_ompl.py &&
         step "Ray example" in_environment release examples/python/ray_encode.py &&
         step "Ray example" in_environment release examples/python/ray_worlds.py &&

@@ -39,6 +39,23 @@ TETRAHEDRON = (
 )
 
 
+def python_blocks(document, section=None):
+    """The blocks of Python code of a document of this repository, or of one of its sections."""
+    text = (DATA.parent / document).read_text(encoding="utf-8")
+    if section:
+        text = text.split(f"\n## {section}\n")[1].split("\n## ")[0]
+    return [block.split("```")[0] for block in text.split("```python\n")[1:]]
+
+
+@pytest.fixture
+def part(torus, tmp_path, monkeypatch):
+    """Makes a new folder the current one, with the torus as part.obj."""
+    monkeypatch.chdir(tmp_path)
+    vertices, faces = torus
+    corners = "".join(f"f {a} {b} {c}\n" for a, b, c in faces + 1)
+    Path("part.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in vertices) + corners)
+
+
 @pytest.fixture(scope="session")
 def screw():
     """the assets of SCREW, by the names of its geoms"""
