@@ -21,7 +21,8 @@ def test_code_of_planners(part):
     assert ("tool", "part") not in names["robot"].checked_pairs and ("hand", "part") in names["robot"].checked_pairs
 
 
-def test_code_of_mujoco(part):
+def names_of_mujoco():
+    """The variables after the code of MuJoCo."""
     [code] = python_blocks("docs/integrations.md", "MuJoCo")
     # A cube of 20 mm on another one: a bolt takes longer to encode.
     for name in ("iso_m16_bolt_6k.obj", "iso_m16_nut_c100.obj"):
@@ -33,7 +34,12 @@ def test_code_of_mujoco(part):
     assert "data.time < 1.0" in code
     names = {}
     exec(code.replace("data.time < 1.0", "data.time < 0.005"), names)
-    assert names["data"].time > 0.005 and names["data"].ncon >= 4
+    return names
+
+
+def test_code_of_mujoco(part):
+    data = names_of_mujoco()["data"]
+    assert data.time > 0.005 and data.ncon >= 4
 
 
 def test_code_of_json_files(part):

@@ -107,7 +107,7 @@ def test_options_that_exclude_each_other(options, text):
 @pytest.mark.parametrize("options, error, text", [
     (dict(encoder="voxels"), ValueError, "encoder: 'voxels'; expected 'certified' or 'sampled'"),
     (dict(encoder="sampled", threshold="wide"), ValueError, "threshold: 'wide'; expected a length of 0 or more, 'safe', or 'squared:'"),
-    (dict(e_max=0), ValueError, "zero"),
+    (dict(e_max=0), ValueError, "e_max: 0; expected an integer from 1 to"),
     (dict(domain=3), ValueError, "domain: int; expected 'bisection', 'gmsh' or a path"),
     (dict(domain="none.msh"), FileNotFoundError, "cannot read none.msh"),
     (dict(domain="voxels"), tesdf.MeshError, "voxels: the extension names no format of tetrahedra"),

@@ -1,11 +1,13 @@
-"""Runs the code of docs that needs PyTorch, JAX or usd-core."""
+"""Runs the code of docs that needs MJWarp, PyTorch, JAX or usd-core."""
 
 from pathlib import Path
 
 import numpy as np
 import tesdf
 from conftest import PARTS, python_blocks
+from test_documents import names_of_mujoco
 from test_usd import POINTS, cube, path_of, stage  # noqa: F401
+from unoptimised_kernels import unoptimised
 
 
 def test_code_of_pytorch(part):
@@ -25,6 +27,15 @@ def test_code_of_pytorch(part):
         assert pose.grad.isfinite().all() and pose.grad.abs().max() > 0.1 and points.grad.abs().max() > 0.5
         assert (len(names["depths"]) > 0) == (expected <= 0)
         assert torch.isfinite(names["time"]) == (at[0] == 0.1)
+
+
+def test_code_of_mjwarp(part):
+    unoptimised()
+    [code] = python_blocks("docs/integrations.md", "MJWarp")
+    names = names_of_mujoco()
+    exec(code, names)
+    assert (names["d"].time.numpy() > 0).all() and len(names["d"].time) == 16
+    assert names["d"].nacon.numpy()[0] >= 4 * 16
 
 
 def test_code_of_jax(part):
