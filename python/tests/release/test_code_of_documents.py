@@ -11,10 +11,8 @@ from unoptimised_kernels import unoptimised
 
 
 def test_code_of_pytorch(part):
-    import torch
-
     [code] = python_blocks("docs/integrations.md", "PyTorch")
-    # 12 mm below the rim, where there is room, and a pose that overlaps.
+    # The peg is apart, and overlaps.
     meshes = {"part.stl": "part.obj", "peg.stl": PARTS / "lobed_peg.obj", "hole.stl": PARTS / "lobed_hole_c100.obj"}
     for name, file in meshes.items():
         code = code.replace(name, str(file))
@@ -26,7 +24,8 @@ def test_code_of_pytorch(part):
         assert names["room"].item() == np.float32(expected)
         assert pose.grad.isfinite().all() and pose.grad.abs().max() > 0.1 and points.grad.abs().max() > 0.5
         assert (len(names["depths"]) > 0) == (expected <= 0)
-        assert torch.isfinite(names["time"]) == (at[0] == 0.1)
+        # At 1 m/s. Bodies that overlap meet at the start.
+        assert 0.05 < names["time"] < 0.1 if expected > 0 else names["time"] == 0
 
 
 def test_code_of_mjwarp(part):
