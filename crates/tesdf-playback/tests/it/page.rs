@@ -136,7 +136,10 @@ fn recorded_contacts_and_those_detected_again_agree() {
         empty.push(record.times()[step], &moved);
     }
     let bare = Playback::new(&empty, &system, Frames::default()).unwrap();
-    assert!(playback.has_recorded_contacts() && !bare.has_recorded_contacts());
+    assert!(!playback.has_recorded_contacts() && !bare.has_recorded_contacts());
+    let third = Frames::Every(3.try_into().unwrap());
+    let has_recorded = |run| Playback::new(run, &system, third).unwrap().has_recorded_contacts();
+    assert!(has_recorded(&record) && !has_recorded(&empty));
     let again = contacts(&bare, &system, detection);
     assert_eq!(found.len(), playback.steps.len());
     assert!(found.iter().all(|frame| frame.found >= 4), "the box lies on four corners");
