@@ -58,9 +58,18 @@ pub fn text(report: &ProveReport) -> String {
         );
     }
     report.faults.iter().for_each(|fault| text += &fault_text(fault));
-    let undecided = report.distances.undecided + report.signs.undecided;
-    if undecided > 0 {
-        text += "  undecided does not mean wrong: a larger --pieces may decide\n";
+    let tallies = [report.distances, report.signs, report.face_tree];
+    for (verdict, name) in [(Verdict::Refuted, "refuted"), (Verdict::Undecided, "undecided")] {
+        let of = |t: &Tally| if verdict == Verdict::Refuted { t.refuted } else { t.undecided };
+        let all: usize = tallies.iter().map(of).sum();
+        let listed = report.faults.iter().filter(|f| f.verdict == verdict).count();
+        if all > listed {
+            text += &format!("  {name}: {} more\n", all - listed);
+        }
+    }
+    if report.out_of_pieces > 0 {
+        let lists = count(report.out_of_pieces, "list");
+        text += &format!("  undecided does not mean wrong: a larger --pieces may decide {lists}\n");
     }
     text
 }
@@ -89,8 +98,8 @@ fn fault_text(fault: &Fault) -> String {
     if let Some([x, y, z]) = fault.point {
         text += &format!("; at {x:?},{y:?},{z:?}");
     }
-    if let (Some(list), Some(face)) = (fault.list_distance, fault.face_distance) {
-        text += &format!("; the list is at {list:?}, the face at {face:?}: nearer by {:.3e}", list - face);
+    if let (Some(list), Some(face), Some(by)) = (fault.list_distance, fault.face_distance, fault.nearer_by) {
+        text += &format!("; the list is at {list:?}, the face at {face:?}: nearer by {by:.3e}");
     }
     text + "\n"
 }

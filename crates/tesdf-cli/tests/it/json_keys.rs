@@ -106,7 +106,10 @@ fn the_page_has_each_key_that_is_printed_and_no_other() {
     check("repair", &["repair open.obj -o closed.ply --fill-holes"]);
     check("encode-all", &["encode-all meshes -o all"]);
     check("inspect", &["inspect peg.tesdf repaired.tesdf jumps.tesdf", "inspect peg.tesdf"]);
-    check("verify", &["verify peg.tesdf --prove --samples 50"]);
+    folder.write("wrong.json", crate::tes_json::FILE.replace("LIST", "0"));
+    folder.good(&["import", "wrong.json", "-o", "wrong.tesdf"]);
+    let proofs = ["peg", "wrong"].map(|name| format!("verify {name}.tesdf --prove --samples 50"));
+    check("verify", &proofs.each_ref().map(String::as_str));
     let beside = "collide peg.tesdf peg.tesdf --pose-a 0.007_0_0.001_0_0_0_1";
     let same = "collide peg.tesdf peg.tesdf --mode node --report";
     check("collide", &[beside]);

@@ -7,7 +7,7 @@ use tesdf::TeSdf;
 use tesdf::glam::DVec3;
 
 /// A tetrahedron with three right angles, and another over its slanted face, whose list is LIST.
-const FILE: &str = r#"{
+pub const FILE: &str = r#"{
     "surface_nodes": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "inner_nodes": [], "outer_nodes": [[1, 1, 1]],
     "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
     "surface_inner_tetras": [[0, 1, 3, 2]], "inner_tetras": [],

@@ -34,20 +34,21 @@ pub fn are_apart(cell: &[DVec3; 4], face: &[DVec3; 3], gap: f64, error: f64) -> 
     })
 }
 
-/// Whether a face does not meet the interior of a tetrahedron. They may share corners. `true` is
-/// exact; `false` proves nothing.
+/// Whether a face does not meet the interior of a tetrahedron that is not flat. They may share
+/// corners. The result is exact.
 ///
-/// It tries planes through three corners, with the tetrahedron on one side and the face on the
-/// other, borders included.
+/// It tries the planes through three of the seven corners, with the tetrahedron on one side and the
+/// face on the other, borders included. These are enough. The planes `n·x = d` that separate the
+/// corners in this way are a convex cone of `(n, d)`. It contains no line, because the tetrahedron is
+/// not flat. So if there is such a plane, there is one on an extreme ray of the cone. There three
+/// corners that are not collinear have `n·x = d`.
 pub fn is_beside(cell: &[DVec3; 4], face: &[DVec3; 3]) -> bool {
     let of_sides = SIDES.iter().map(|(side, _)| side.map(|k| cell[k]));
-    let shared = (0..3).flat_map(|at| (0..4).map(move |corner| (at, corner)));
-    let shared = shared.filter(|&(at, corner)| face[at] == cell[corner]);
-    let through_shared = shared.flat_map(|(at, corner)| {
-        let others = (0..4).filter(move |&k| k != corner);
-        others.flat_map(move |k| [1, 2].map(|next| [cell[corner], cell[k], face[(at + next) % 3]]))
-    });
-    of_sides.chain([*face]).chain(through_shared).any(|[a, b, c]| {
+    let edges_of_cell = (0..4).flat_map(|j| (0..j).map(move |i| [cell[i], cell[j]]));
+    let mixed = edges_of_cell.flat_map(|[p, q]| face.map(|a| [p, q, a]));
+    let edges_of_face = (0..3).map(|k| [face[k], face[(k + 1) % 3]]);
+    let mixed = mixed.chain(edges_of_face.flat_map(|[a, b]| cell.map(|p| [a, b, p])));
+    of_sides.chain([*face]).chain(mixed).any(|[a, b, c]| {
         let side = |p: &DVec3| orientation(a, b, c, *p);
         let (mut of_cell, mut of_face) = (cell.map(|p| side(&p)), face.map(|p| side(&p)));
         if of_cell.iter().any(|&s| s < 0) {
@@ -93,6 +94,7 @@ pub fn orientation(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::Random;
 
     const CELL: [DVec3; 4] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
 
@@ -128,6 +130,61 @@ mod tests {
         for face in [[DVec3::ZERO, DVec3::X, inner], [inner, outward, DVec3::Z], [DVec3::Z, inner, -outward]]
         {
             assert!(!is_beside(&CELL, &face), "{face:?}");
+        }
+    }
+
+    type Integers = [i64; 3];
+
+    fn minus(a: Integers, b: Integers) -> Integers {
+        [0, 1, 2].map(|k| a[k] - b[k])
+    }
+
+    fn cross(a: Integers, b: Integers) -> Integers {
+        [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i])
+    }
+
+    fn dot(a: Integers, b: Integers) -> i64 {
+        (0..3).map(|k| a[k] * b[k]).sum()
+    }
+
+    /// Whether a plane separates them that is parallel to a side or to an edge of each, in integers:
+    /// the directions of the sides of their Minkowski difference.
+    fn is_beside_in_integers(cell: [Integers; 4], face: [Integers; 3]) -> bool {
+        let [a, b, c] = face;
+        let edges = [minus(b, a), minus(c, b), minus(a, c)];
+        let of_cell: Vec<_> = (0..4).flat_map(|j| (0..j).map(move |i| minus(cell[j], cell[i]))).collect();
+        let crossed = edges.iter().flat_map(|&e| of_cell.iter().map(move |&f| cross(e, f)));
+        let sides = SIDES.map(|([i, j, k], _)| cross(minus(cell[j], cell[i]), minus(cell[k], cell[i])));
+        let directions = crossed.chain(sides).chain([cross(edges[0], edges[1])]).filter(|d| *d != [0; 3]);
+        let mut signed = directions.flat_map(|d| [d, minus([0; 3], d)]);
+        signed.any(|d| {
+            let high = face.iter().map(|&p| dot(d, p)).max();
+            high <= cell.iter().map(|&p| dot(d, p)).min()
+        })
+    }
+
+    /// Corners on a small lattice share points, edges and planes, and faces without area are among
+    /// them.
+    #[test]
+    fn whether_a_face_is_beside_a_cell_is_decided_as_in_integers() {
+        let mut counts = [0; 2];
+        let mut index = 0;
+        while counts[0] < 3000 || counts[1] < 3000 {
+            let random = &mut Random::new(5, index);
+            index += 1;
+            let side = 2 + random.below(5);
+            let mut point = || [0; 3].map(|_: i64| random.below(side) as i64);
+            let (cell, face): ([Integers; 4], [Integers; 3]) =
+                ([0; 4].map(|_| point()), [0; 3].map(|_| point()));
+            let of = |p: Integers| DVec3::from_array(p.map(|x| x as f64 / 8.0));
+            let (local, of_face) = (cell.map(of), face.map(of));
+            let [a, b, c, d] = local;
+            if orientation(a, b, c, d) == 0 {
+                continue;
+            }
+            let expected = is_beside_in_integers(cell, face);
+            assert_eq!(is_beside(&local, &of_face), expected, "{cell:?} {face:?}");
+            counts[usize::from(expected)] += 1;
         }
     }
 }

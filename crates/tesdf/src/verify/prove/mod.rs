@@ -191,7 +191,6 @@ pub fn prove(
     let mut face_tree = Tally::default();
     face_tree.count(of_tree.first());
     found.faults.extend(of_tree);
-    found.faults.truncate(ProveReport::FAULTS);
     let is_proved = |t: &Tally| t.proved == t.claims;
     Ok(ProveReport {
         proved: [found.distances, found.signs, face_tree].iter().all(is_proved),
@@ -205,7 +204,8 @@ pub fn prove(
         pieces: found.pieces,
         most_pieces: found.most_pieces,
         nearer_by: (found.nearer_by > 0.0).then_some(found.nearer_by),
-        faults: found.faults,
+        out_of_pieces: found.out_of_pieces,
+        faults: found.faults.into_all(),
     })
 }
 

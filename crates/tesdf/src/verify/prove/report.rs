@@ -34,13 +34,47 @@ pub struct ProveReport {
     /// The most by which a face that a list misses is nearer than the list, at the points where
     /// lists were shown to be wrong. In the mesh's unit; `None`: no list was.
     pub nearer_by: Option<f64>,
-    /// Claims that are not proved: the first [`FAULTS`](Self::FAULTS), in the order of the cells.
+    /// Number of lists that are undecided because [`pieces`](super::ProveOptions::pieces) did not
+    /// suffice. More pieces may decide them, and no other undecided claim.
+    pub out_of_pieces: usize,
+    /// Claims that are not proved: the first [`REFUTED`](Self::REFUTED) that are wrong, then the
+    /// first [`UNDECIDED`](Self::UNDECIDED) of the others, each in the order of the cells.
     pub faults: Vec<Fault>,
 }
 
 impl ProveReport {
-    /// Largest number of listed faults.
-    pub const FAULTS: usize = 16;
+    /// Largest number of refuted claims in [`faults`](Self::faults).
+    pub const REFUTED: usize = 100;
+    /// Largest number of undecided claims in [`faults`](Self::faults).
+    pub const UNDECIDED: usize = 16;
+}
+
+/// The first faults of each verdict.
+#[derive(Debug, Default)]
+pub(super) struct Faults {
+    refuted: Vec<Fault>,
+    undecided: Vec<Fault>,
+}
+
+impl Faults {
+    /// Adds faults that come after all others.
+    pub fn extend(&mut self, faults: impl IntoIterator<Item = Fault>) {
+        for fault in faults {
+            let (kept, most) = match fault.verdict {
+                Verdict::Refuted => (&mut self.refuted, ProveReport::REFUTED),
+                Verdict::Undecided => (&mut self.undecided, ProveReport::UNDECIDED),
+            };
+            if kept.len() < most {
+                kept.push(fault);
+            }
+        }
+    }
+
+    /// The refuted ones, then the undecided ones.
+    pub fn into_all(mut self) -> Vec<Fault> {
+        self.refuted.append(&mut self.undecided);
+        self.refuted
+    }
 }
 
 /// Numbers of claims of one kind.
@@ -116,6 +150,9 @@ pub struct Fault {
     pub list_distance: Option<f64>,
     /// For a wrong list, the distance of the face from the point, in the mesh's unit.
     pub face_distance: Option<f64>,
+    /// For a wrong list, by how much the face is nearer to the point than the list, in the mesh's
+    /// unit.
+    pub nearer_by: Option<f64>,
     /// The reason, for people.
     pub reason: String,
 }
@@ -130,6 +167,7 @@ impl Fault {
             face: None,
             list_distance: None,
             face_distance: None,
+            nearer_by: None,
             reason: reason.into(),
         }
     }
@@ -140,11 +178,6 @@ impl Fault {
 
     pub(super) fn undecided(claim: Claim, reason: impl Into<String>) -> Self {
         Self::new(claim, Verdict::Undecided, reason)
-    }
-
-    /// For a wrong list, by how much the face is nearer than the list, in the mesh's unit.
-    pub fn nearer_by(&self) -> Option<f64> {
-        Some(self.list_distance? - self.face_distance?)
     }
 
     /// Sets the cell.
@@ -164,7 +197,7 @@ impl Fault {
 
     /// Sets the distances, given in the local frame.
     pub(super) fn distances(self, asset: &TeSdf, list: f64, face: f64) -> Self {
-        let unit = asset.frame.inverse_scale();
-        Self { list_distance: Some(list * unit), face_distance: Some(face * unit), ..self }
+        let [list, face] = [list, face].map(|distance| distance * asset.frame.inverse_scale());
+        Self { list_distance: Some(list), face_distance: Some(face), nearer_by: Some(list - face), ..self }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::apart::{is_beside, orientation};
+use super::apart::{common_point, is_beside, orientation};
 use super::report::{Claim, Fault};
 use super::signs::{Signs, side_of};
 use crate::asset::layout::{Label, Node};
@@ -36,13 +36,13 @@ impl Signs<'_> {
             let bound = self.surface.triangles[**face as usize].low(centroid, self.surface.error);
             bound.distance <= radius + 2.0 * self.surface.error
         };
-        let passes =
-            |face: &&u32| !is_beside(&cell.corners, &self.surface.triangles[**face as usize].corners);
-        let face = near.iter().filter(comes_near).find(passes)?;
-        let reason =
-            "a face may pass through the tetrahedron: no plane through corners of both lies between them";
-        let fault = Fault::undecided(Claim::Sign, reason).cell(root as u32).at(self.asset, centroid);
-        Some(fault.face(self.asset, *face))
+        let corners_of = |face: u32| &self.surface.triangles[face as usize].corners;
+        let passes = |face: &&u32| !is_beside(&cell.corners, corners_of(**face));
+        let face = *near.iter().filter(comes_near).find(passes)?;
+        let point = common_point(&cell.corners, corners_of(face)).unwrap_or(centroid);
+        let reason = "a face passes through the tetrahedron, whose label says that none does";
+        let fault = Fault::refuted(Claim::Sign, reason).cell(root as u32).at(self.asset, point);
+        Some(fault.face(self.asset, face))
     }
 
     /// The common side of all cells of a tetrahedron; `None` when they differ.

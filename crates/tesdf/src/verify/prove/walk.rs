@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use super::ProveOptions;
 use super::distance::{Open, Reason, Search};
 use super::problem::Problem;
-use super::report::{Claim, Fault, ProveReport, Tally};
+use super::report::{Claim, Fault, Faults, Tally};
 use super::signs::Signs;
 use crate::TeSdf;
 use crate::asset::layout::Node;
@@ -20,19 +20,21 @@ pub struct CellResults {
     pub most_pieces: u64,
     /// The most by which a face was found nearer than a list, in the unit of the mesh; 0 for none.
     pub nearer_by: f64,
-    pub faults: Vec<Fault>,
+    /// Lists that are undecided for want of pieces.
+    pub out_of_pieces: usize,
+    pub faults: Faults,
 }
 
 impl CellResults {
     pub fn join(mut self, other: Self) -> Self {
-        self.faults.extend(other.faults);
-        self.faults.truncate(ProveReport::FAULTS);
+        self.faults.extend(other.faults.into_all());
         Self {
             distances: self.distances.join(other.distances),
             signs: self.signs.join(other.signs),
             pieces: self.pieces + other.pieces,
             most_pieces: self.most_pieces.max(other.most_pieces),
             nearer_by: self.nearer_by.max(other.nearer_by),
+            out_of_pieces: self.out_of_pieces + other.out_of_pieces,
             faults: self.faults,
         }
     }
@@ -40,7 +42,7 @@ impl CellResults {
     /// Counts a claim on distances.
     fn distance(&mut self, fault: Option<Fault>) {
         self.distances.count(fault.as_ref());
-        self.nearer_by = fault.as_ref().and_then(Fault::nearer_by).unwrap_or(0.0).max(self.nearer_by);
+        self.nearer_by = fault.as_ref().and_then(|f| f.nearer_by).unwrap_or(0.0).max(self.nearer_by);
         self.faults.extend(fault);
     }
 
@@ -119,9 +121,7 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
             _ => Vec::new(),
         };
         if let Node::Listed(..) = node {
-            let (fault, pieces) = self.distances(word, cell, &list, near);
-            found.distance(fault);
-            (found.pieces, found.most_pieces) = (pieces, pieces);
+            self.distances(&mut found, word, cell, &list, near);
         }
         found.sign(match self.asset.conforming {
             None => self.signs.fault(word, cell, node, &list, near),
@@ -130,8 +130,8 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
         found
     }
 
-    /// The fault in the list of a cell, and the number of pieces of its search.
-    fn distances(&self, word: u32, cell: &Cell, list: &[u32], near: &[u32]) -> (Option<Fault>, u64) {
+    /// Checks the list of a cell.
+    fn distances(&self, found: &mut CellResults, word: u32, cell: &Cell, list: &[u32], near: &[u32]) {
         let middle = cell.centroid();
         let corners = cell.corners.map(|c| c - middle);
         let surface = self.signs.surface;
@@ -147,6 +147,9 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
         };
         let mut search = Search::new(&problem, self.options.pieces, &is_cancelled);
         let outcome = search.run(corners);
+        let is_short = matches!(outcome, Err(Open::Undecided { reason: Reason::Pieces, .. }));
+        found.out_of_pieces = usize::from(is_short);
+        (found.pieces, found.most_pieces) = (search.pieces, search.pieces);
         let fault = outcome.err().map(|open| match open {
             Open::Refuted { at, face, list, distance } => {
                 let reason = "a face that is not in the list of the cell is closer than the list";
@@ -164,6 +167,6 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
             }
             Open::Cancelled => Fault::undecided(Claim::Distance, "cancelled"),
         });
-        (fault.map(|f| f.cell(word)), search.pieces)
+        found.distance(fault.map(|f| f.cell(word)));
     }
 }
