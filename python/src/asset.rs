@@ -355,7 +355,8 @@ impl Asset {
     }
 
     /// Compares every byte with the checksums, then the answers at `samples` points with brute
-    /// force over all faces. Ctrl-C ends it with KeyboardInterrupt.
+    /// force over all faces; those of an asset that certifies nothing also at up to four points
+    /// inside each of its cells. Ctrl-C ends it with KeyboardInterrupt.
     ///
     /// Raises AssetError if the file is damaged. Wrong answers are in the report.
     #[pyo3(signature = (samples = 10_000))]

@@ -315,7 +315,8 @@ class Asset:
         and for a conforming domain the classes of its vertices and tetrahedra."""
     def verify(self, samples: int = 10_000) -> VerifyReport:
         """Compares every byte with the checksums, then the answers at `samples` points with brute
-        force over all faces. Ctrl-C ends it with KeyboardInterrupt.
+        force over all faces; those of an asset that certifies nothing also at up to four points
+        inside each of its cells. Ctrl-C ends it with KeyboardInterrupt.
 
         Raises AssetError if the file is damaged. Wrong answers are in the report."""
     @property

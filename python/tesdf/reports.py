@@ -297,7 +297,7 @@ class Inspection:
 @dataclass(frozen=True)
 class Promise:
     """Promised accuracy of a precision: errors of distances relative to the diagonal, of
-    gradients in radians."""
+    gradients in radians. Where nothing is promised, answers are compared with it all the same."""
 
     of_diagonal: float
     ulps: float
@@ -345,6 +345,8 @@ class PrecisionReport:
     largest_error_of_diagonal: float
     largest_error_of_promise: float
     worst: Optional[Worst]
+    distance_mistakes: int
+    """points with a larger error than the bound"""
     sign_mistakes: int
     worst_sign: Optional[Worst]
     gradient_mistakes: int
@@ -360,8 +362,16 @@ class VerifyReport:
     """Result of `Asset.verify`."""
 
     passed: bool
-    """whether every promise was kept"""
+    """whether no answer was wrong by more than the bounds, where lists are not cut"""
+    certified: bool
+    """whether the asset promises distances; if not, they are compared all the same"""
     samples: int
+    """points, without those inside cells"""
+    cell_points: int
+    """points inside cells, of an asset that certifies nothing"""
+    cells: int
+    """cells with such a point"""
+    listed_cells: int
     seed: int
     faces: int
     winding_brute_force: int

@@ -50,6 +50,8 @@ def test_json_of_the_authors(beam, tmp_path):
     assert again.certificate.delta is None and again.certificate.domain == "conforming"
     assert again.source.name == "beam.json" and again.inspect().classes == asset.inspect().classes
     assert again.statistics.entries == asset.statistics.entries
+    report = again.verify(samples=200)
+    assert report.passed and not report.certified and (report.cells, report.cell_points) == (576, 800)
     points = np.random.default_rng(1).uniform(-1, 7, (500, 3))
     assert np.abs(again.signed_distance(points) - asset.signed_distance(points)).max() < 1e-12
     with pytest.raises(tesdf.EncodeError, match='domain="gmsh", plain=True'):

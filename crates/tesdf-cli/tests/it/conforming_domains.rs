@@ -40,8 +40,13 @@ fn a_gmsh_domain_is_encoded_inspected_and_verified() {
             + count("boundary_outer_tetrahedra")
             + count("outer_tetrahedra");
         assert!(if more.is_empty() { listed > tetrahedra } else { listed == tetrahedra });
-        let verified = json(&folder.good(&["verify", "beam.tesdf", "--samples", "2000", "--json"]));
-        assert_eq!(verified["passed"], true);
+        let (code, out, _) = folder.tesdf(&["verify", "beam.tesdf", "--samples", "2000", "--json"]);
+        let verified = json(&out);
+        // The paper's samples miss faces, which does not pass although nothing is promised.
+        let wrong = verified["comparison"]["precisions"][1]["distance_mistakes"].as_u64().unwrap();
+        let passed = proved || wrong == 0;
+        assert_eq!((code, &verified["passed"]), (Some(i32::from(!passed)), &passed.into()), "{out}");
+        assert_eq!(verified["comparison"]["certified"], proved);
         let beyond = &verified["comparison"]["precisions"][1]["largest_error_beyond"];
         assert_eq!(beyond.is_number(), !proved || more.contains(&"--e-max"), "{more:?}: {beyond}");
     }

@@ -27,6 +27,15 @@ fn a_file_is_imported_verified_and_exported() {
     assert!(text.contains("good.json"), "{text}");
     let text = folder.good(&["verify", "good.tesdf", "--prove", "--samples", "500"]);
     assert!(text.contains("the file certifies nothing") && !text.contains("nearer by"), "{text}");
+    assert!(text.ends_with("\npassed\n") && !text.contains("as promised"), "{text}");
+    let text = folder.good(&["verify", "good.tesdf", "--samples", "500"]);
+    let cells = "the file certifies nothing: 8 points more inside 2 of 2 cells with a list\n";
+    assert!(
+        text.contains(cells) && text.contains("f64: nothing is promised; right at these points\n"),
+        "{text}"
+    );
+    assert!(text.ends_with("passed at these points; --prove tells of all points\n"), "{text}");
+    assert!(!text.contains("as promised"), "{text}");
 
     folder.good(&["export", "good.tesdf", "-o", "again.json"]);
     folder.good(&["import", "again.json", "-o", "again.tesdf"]);
@@ -38,13 +47,19 @@ fn a_file_is_imported_verified_and_exported() {
     // up to 1 instead of 0.
     folder.write("bad.json", FILE.replace("LIST", "0"));
     folder.good(&["import", "bad.json", "-o", "bad.tesdf"]);
+    let (code, text, _) = folder.tesdf(&["verify", "bad.tesdf", "--samples", "500"]);
+    assert!(code == Some(1) && text.ends_with("\nnot passed\n"), "{text}");
+    assert!(text.matches("nothing is promised; WRONG\n").count() == 2, "{text}");
+    assert!(text.contains("  distances       wrong at "), "{text}");
     let (code, text, _) = folder.tesdf(&["verify", "bad.tesdf", "--prove", "--samples", "500"]);
     assert_eq!(code, Some(1));
     assert!(text.contains("1 refuted") && text.matches("nearer by").count() == 2, "{text}");
+    assert!(text.contains("  refuted: cell 1: ") && !text.contains("--pieces"), "{text}");
     let (_, text, _) = folder.tesdf(&["verify", "bad.tesdf", "--prove", "--samples", "500", "--json"]);
     let found: serde_json::Value = serde_json::from_str(&text).unwrap();
     let most = found["prove"]["nearer_by"].as_f64().unwrap();
     assert!(most > 0.1 && most <= 1.0, "{most}");
+    assert_eq!(found["prove"]["faults"][0]["nearer_by"], most);
 }
 
 /// A file that was written once must continue to open, and to give the same answers and bytes.

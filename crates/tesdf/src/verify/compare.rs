@@ -7,7 +7,8 @@ use crate::geometry::is_flat;
 use crate::mesh::TriangleMesh;
 use crate::query::{Answer, Precision};
 
-/// The error bounds that a [`Precision`] promises.
+/// The error bounds that a [`Precision`] promises. The answers of an asset that certifies nothing
+/// are compared with the same bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Promise {
     /// Largest error of a distance, as a fraction of the diagonal.
@@ -109,7 +110,7 @@ pub struct ClassErrors {
 pub struct PrecisionReport {
     /// `f32` or `f64`.
     pub precision: &'static str,
-    /// Whether all promises are kept.
+    /// Whether there is no mistake.
     pub passed: bool,
     /// The promised bounds.
     pub promise: Promise,
@@ -117,11 +118,13 @@ pub struct PrecisionReport {
     pub largest_error: f64,
     /// The same as a fraction of the diagonal.
     pub largest_error_of_diagonal: f64,
-    /// Largest error relative to the bound at its point. The promise is kept when this is at most
+    /// Largest error relative to the bound at its point. A distance is right when this is at most
     /// 1.
     pub largest_error_of_promise: f64,
     /// The point with the largest relative error.
     pub worst: Option<Worst>,
+    /// Number of points with a larger error than the bound.
+    pub distance_mistakes: usize,
     /// Number of points on the wrong side that are farther from the surface than the promised
     /// error.
     pub sign_mistakes: usize,
@@ -138,7 +141,7 @@ pub struct PrecisionReport {
     /// Largest error of a signed distance where no bound is promised; `None` when every point has a
     /// promise.
     pub largest_error_beyond: Option<f64>,
-    /// Errors by class, without the points that have no promise.
+    /// Errors by class, without the points where lists are cut.
     pub classes: Vec<ClassErrors>,
 }
 
@@ -168,8 +171,11 @@ impl Largest {
 pub(super) struct Comparison {
     precision: Precision,
     promise: Promise,
+    /// Nearer to the surface than this, lists are not cut; `None`: everywhere.
+    uncut_within: Option<f64>,
     classes: [(usize, f64); PointClass::ALL.len()],
     beyond: f64,
+    distance_mistakes: usize,
     error: Largest,
     sign_mistakes: usize,
     sign: Largest,
@@ -182,8 +188,10 @@ impl Comparison {
         Self {
             precision,
             promise: Promise::new(precision, mesh, certificate),
+            uncut_within: certificate.exactness_distance(),
             classes: Default::default(),
             beyond: 0.0,
+            distance_mistakes: 0,
             error: Largest::default(),
             sign_mistakes: 0,
             sign: Largest::default(),
@@ -222,12 +230,16 @@ impl Comparison {
             self.sign_mistakes += 1;
             self.sign.add(expected.abs(), at);
         }
-        if self.promise.within.is_some_and(|within| expected.abs() >= within) {
+        let is_beyond = |within: Option<f64>| within.is_some_and(|within| expected.abs() >= within);
+        if is_beyond(self.promise.within) {
             self.beyond = self.beyond.max(error);
+        }
+        if is_beyond(self.uncut_within) {
             return;
         }
         let slot = &mut self.classes[class as usize];
         *slot = (slot.0 + 1, slot.1.max(error));
+        self.distance_mistakes += usize::from(error > bound);
         self.error.add(error / bound, at);
         match gradient_error(p, expected, answer, offset, &self.promise) {
             Some(angle) => {
@@ -246,8 +258,10 @@ impl Comparison {
     }
 
     /// A point whose distance, or else sign, breaks the promise; `None` when there is none.
-    pub(super) fn worst_mistake(self) -> Option<Worst> {
-        if self.error.value > 1.0 { self.error.at } else { self.sign.at }
+    pub(super) fn worst_broken(self) -> Option<Worst> {
+        // An asset that certifies nothing promises signs only.
+        let is_promised = self.promise.within.is_none_or(|within| within > 0.0);
+        if is_promised && self.distance_mistakes > 0 { self.error.at } else { self.sign.at }
     }
 
     pub(super) fn join(mut self, other: Self) -> Self {
@@ -257,8 +271,10 @@ impl Comparison {
         Self {
             precision: self.precision,
             promise: self.promise,
+            uncut_within: self.uncut_within,
             classes: self.classes,
             beyond: self.beyond.max(other.beyond),
+            distance_mistakes: self.distance_mistakes + other.distance_mistakes,
             error: self.error.join(other.error),
             sign_mistakes: self.sign_mistakes + other.sign_mistakes,
             sign: self.sign.join(other.sign),
@@ -275,13 +291,14 @@ impl Comparison {
                 Precision::F32 => "f32",
                 Precision::F64 => "f64",
             },
-            passed: self.error.value <= 1.0 && self.sign_mistakes == 0 && self.gradient_mistakes == 0,
+            passed: self.distance_mistakes + self.sign_mistakes + self.gradient_mistakes == 0,
             largest_error_beyond: self.promise.within.map(|_| self.beyond),
             promise: self.promise,
             largest_error,
             largest_error_of_diagonal: largest_error / self.promise.diagonal,
             largest_error_of_promise: self.error.value,
             worst: self.error.at,
+            distance_mistakes: self.distance_mistakes,
             sign_mistakes: self.sign_mistakes,
             worst_sign: self.sign.at,
             gradient_mistakes: self.gradient_mistakes,

@@ -3,7 +3,8 @@
 //!
 //! Input: an opened asset. Output of [`verify()`]: for each [`Precision`] the largest error, wrong
 //! signs and wrong gradients, each with its point. The expected values come from the mesh in the
-//! asset alone, not from the lists, the forest or the face tree.
+//! asset alone, not from the lists, the forest or the face tree. Where an asset certifies nothing,
+//! its answers are compared all the same.
 pub(crate) mod brute_force;
 mod compare;
 mod prove;
@@ -35,7 +36,8 @@ use true_sign::{TrueSign, signed, unshifted};
 /// Number and seed of the points of [`verify`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VerifyOptions {
-    /// Number of points. The classes alternate.
+    /// Number of points. The classes alternate. An asset that certifies nothing has up to four
+    /// times as many more inside its cells.
     pub samples: usize,
     /// The same seed gives the same points.
     pub seed: u64,
@@ -50,10 +52,20 @@ impl Default for VerifyOptions {
 /// The result of [`verify`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerifyReport {
-    /// Whether every promise was kept.
+    /// Whether every answer was right within the bounds of [`Promise`], where lists are not cut.
+    /// The same bounds count where nothing is [certified](Self::certified), as no answer tells that
+    /// it may be wrong.
     pub passed: bool,
-    /// Points compared.
+    /// Whether the certificate promises distances. If not, `passed` tells nothing of other points.
+    pub certified: bool,
+    /// Points compared, without those inside cells.
     pub samples: usize,
+    /// Points compared inside cells with a list; 0 for a certified asset.
+    pub cell_points: usize,
+    /// Number of cells with such a point.
+    pub cells: usize,
+    /// Number of cells with a list.
+    pub listed_cells: usize,
     /// Seed of the points.
     pub seed: u64,
     /// Number of faces in the mesh. Each point is compared with all of them.
@@ -97,6 +109,11 @@ const CHUNK: u64 = 32;
 /// Compares the asset with brute force at points of every [`PointClass`], on all threads of the
 /// current rayon pool.
 ///
+/// An asset that certifies nothing, such as an imported one, is compared at points inside its cells
+/// too: four in each cell with a list, but no more than four times `samples` in all. It does not
+/// pass if an answer is wrong by more than rounding, even though no bound is promised. A cell can
+/// still be wrong between the points; [`prove`] finds it.
+///
 /// `progress` receives the completed fraction, 0 to 1, from any thread, and decides whether to
 /// continue. Checksums are not verified; [`TeSdf::verify_checksums`] does that.
 ///
@@ -127,19 +144,19 @@ pub fn verify(
     }
     let certificate = asset.about().certificate();
     let sign = TrueSign::new(all, rule);
-    let sampler = Sampler::new(asset, &mesh, &sign, options.seed);
+    let sampler = Sampler::new(asset, &mesh, &sign, *options);
     let mut place = vec![None; ids.iter().max().map_or(0, |id| *id as usize + 1)];
     ids.iter().enumerate().for_each(|(at, &id)| place[id as usize] = Some(at));
     let truth = Truth { faces: BruteForce::new(&mesh, diagonal), place, sign: &sign };
-    let samples = options.samples as u64;
+    let points = options.samples as u64 + sampler.in_cells();
     let done = AtomicUsize::new(0);
-    let parts = (0..samples.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
+    let parts = (0..points.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
         let mut found = SampleResults::new(&mesh, certificate);
-        let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(samples);
+        let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(points);
         let count = (indices.end - indices.start) as usize;
         indices.for_each(|index| found.add(asset, &truth, index, sampler.point(index)));
         let before = done.fetch_add(count, Ordering::Relaxed);
-        match progress((before + count) as f64 / options.samples as f64) {
+        match progress((before + count) as f64 / points as f64) {
             ControlFlow::Continue(()) => Some(found),
             ControlFlow::Break(()) => None,
         }
@@ -149,7 +166,11 @@ pub fn verify(
     let precisions = found.comparisons.map(Comparison::report);
     Ok(VerifyReport {
         passed: precisions.iter().all(|p| p.passed) && found.disagreements == 0,
+        certified: certificate.delta().is_some(),
         samples: options.samples,
+        cell_points: sampler.in_cells() as usize,
+        cells: sampler.cells_with_points() as usize,
+        listed_cells: asset.about().statistics.listed_cells,
         seed: options.seed,
         faces: mesh.faces().len(),
         winding_brute_force: found.brute_force,
@@ -195,13 +216,13 @@ impl SampleResults {
         }
     }
 
-    fn add(&mut self, asset: &TeSdf, truth: &Truth, index: u64, p: DVec3) {
-        let class = PointClass::of_index(index);
+    fn add(&mut self, asset: &TeSdf, truth: &Truth, index: u64, (class, p): (PointClass, DVec3)) {
         let distance = truth.faces.distance(p);
         let inside = truth.sign.is_inside(p);
         // Nearer than this bound, rounding could put the point on the surface, where the other
         // method may return either number.
-        if index.is_multiple_of(BRUTE_FORCE_EVERY) && distance > self.comparisons[1].promise().distance(p) {
+        let counts_all = index.is_multiple_of(BRUTE_FORCE_EVERY) && class != PointClass::InCell;
+        if counts_all && distance > self.comparisons[1].promise().distance(p) {
             self.brute_force += 1;
             self.disagreements += usize::from(truth.sign.disagrees(p));
         }

@@ -1,6 +1,7 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use super::VerifyOptions;
 use super::true_sign::TrueSign;
 use crate::TeSdf;
 use crate::asset::CellKind;
@@ -28,11 +29,13 @@ pub enum PointClass {
     Deep,
     /// 0.2 to 1000 diagonals outside the bounds.
     FarOutside,
+    /// Inside a cell with a list, cell by cell. Only for an asset that certifies nothing.
+    InCell,
 }
 
 impl PointClass {
     /// All classes.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Box,
         Self::NearSurface,
         Self::OnFace,
@@ -41,6 +44,7 @@ impl PointClass {
         Self::CellBorder,
         Self::Deep,
         Self::FarOutside,
+        Self::InCell,
     ];
 
     /// Name for people.
@@ -54,11 +58,12 @@ impl PointClass {
             Self::CellBorder => "on borders of cells",
             Self::Deep => "deep inside",
             Self::FarOutside => "far outside",
+            Self::InCell => "inside cells",
         }
     }
 
-    /// The class of sample `index`. Any 20 consecutive samples contain all classes; those where
-    /// errors are likely come most often.
+    /// The class of sample `index`. Any 20 consecutive samples contain all classes but
+    /// [`InCell`](Self::InCell); those where errors are likely come most often.
     pub fn of_index(index: u64) -> Self {
         use PointClass::*;
         const TURN: [PointClass; 20] = [
@@ -98,33 +103,72 @@ pub(super) struct Sampler<'a> {
     areas: Weighted,
     /// Corners of each cell of the domain, in the mesh's unit.
     cells: Vec<[DVec3; 4]>,
+    /// Corners of each cell with a list, for an asset that certifies nothing.
+    listed: Vec<[DVec3; 4]>,
+    /// Number of points of classes that take turns.
+    samples: u64,
 }
 
 /// Largest number of random points tried to find points inside.
 const TRIES: usize = 64;
 /// Number of points inside from which the deepest is taken.
 const DEEPEST_OF: usize = 4;
+/// Largest number of points inside a cell with a list, and of points inside cells for each other
+/// point.
+const IN_CELL: u64 = 4;
 
 impl<'a> Sampler<'a> {
-    pub(super) fn new(asset: &'a TeSdf, mesh: &'a TriangleMesh, sign: &'a TrueSign, seed: u64) -> Self {
+    pub(super) fn new(
+        asset: &'a TeSdf,
+        mesh: &'a TriangleMesh,
+        sign: &'a TrueSign,
+        options: VerifyOptions,
+    ) -> Self {
         let diagonal = mesh.diagonal();
         // Relative to the diagonal, so that areas do not underflow.
         let areas = Weighted::new((0..mesh.faces().len()).map(|f| {
             let [a, b, c] = mesh.triangle(f);
             ((b - a) / diagonal).cross((c - a) / diagonal).length()
         }));
-        let mut cells = Vec::new();
+        let is_certified = asset.about().certificate().delta().is_some();
+        let (mut cells, mut listed) = (Vec::new(), Vec::new());
         asset.visit_cells(|cell| {
+            if cell.kind.is_listed() && !is_certified {
+                listed.push(cell.corners);
+            }
             if cell.kind != CellKind::NotOfDomain {
                 cells.push(cell.corners);
             }
         });
-        Self { asset, mesh, sign, seed, bounds: mesh.bounds(), diagonal, areas, cells }
+        let (seed, samples) = (options.seed, options.samples as u64);
+        Self { asset, mesh, sign, seed, bounds: mesh.bounds(), diagonal, areas, cells, listed, samples }
     }
 
-    pub(super) fn point(&self, index: u64) -> DVec3 {
+    /// Number of points inside cells. They come after the others.
+    pub(super) fn in_cells(&self) -> u64 {
+        IN_CELL * self.samples.min(self.listed.len() as u64)
+    }
+
+    /// Number of cells with such a point.
+    pub(super) fn cells_with_points(&self) -> u64 {
+        self.in_cells().min(self.listed.len() as u64)
+    }
+
+    pub(super) fn point(&self, index: u64) -> (PointClass, DVec3) {
+        let class = if index < self.samples { PointClass::of_index(index) } else { PointClass::InCell };
+        (class, self.of_class(class, index))
+    }
+
+    fn of_class(&self, class: PointClass, index: u64) -> DVec3 {
         let random = &mut Random::new(self.seed, index);
-        match PointClass::of_index(index) {
+        match class {
+            PointClass::InCell => {
+                // Cells have points in turn; when there are more cells than points, those in equal
+                // steps.
+                let (at, cells) = (u128::from(index - self.samples), self.listed.len() as u128);
+                let with_points = u128::from(self.cells_with_points());
+                random.in_simplex(&self.listed[(at % with_points * cells / with_points) as usize])
+            }
             PointClass::Box => self.in_box(random),
             PointClass::NearSurface => {
                 let corners = self.face(random);

@@ -44,7 +44,7 @@ pub(crate) fn self_check(asset: &TeSdf, solid: &SolidMesh) -> Result<Option<(Pre
             let expected = signed(distance, inside, &answer);
             comparison.add(PointClass::Box, point, expected, &answer, None);
         }
-        Some(precision).zip(comparison.worst_mistake())
+        Some(precision).zip(comparison.worst_broken())
     };
     Ok(mistake(Precision::F64).or_else(|| mistake(Precision::F32)))
 }

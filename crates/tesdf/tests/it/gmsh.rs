@@ -1,6 +1,7 @@
 //! Tests with Gmsh as a subprocess. It must be installed (`pip install gmsh` or `apt install
 //! gmsh`), or `TESDF_GMSH` must have its path; `./test` does that.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -10,11 +11,13 @@ use tesdf::domain::gmsh::{
     tetrahedralise_and_report,
 };
 use tesdf::domain::{ConformingError, ConformingMesh};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Refinement};
 use tesdf::geometry::Aabb;
 use tesdf::geometry::internal::tetrahedron_volume;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{ProgramError, SolidMesh, TriangleMesh, WindingNumber};
-use tesdf::{Length, Progress, Side};
+use tesdf::verify::{ProveOptions, prove};
+use tesdf::{Length, Preset, Progress, Side};
 
 fn volume(mesh: &ConformingMesh, side: Side) -> f64 {
     let of_side = |&t: &usize| mesh.sides()[t] == side;
@@ -45,6 +48,18 @@ fn the_inside_is_filled() {
             assert_eq!(winding.at(0.4 * a + 0.3 * b + 0.2 * c + 0.1 * d), 1, "{file}, tetrahedron {t}");
         }
     }
+}
+
+/// Its bent surfaces have faces close beside tetrahedra, which only planes through corners of both
+/// separate.
+#[test]
+fn an_encoding_in_it_is_proved() {
+    let (solid, mesh) = fill("procedural/beam_bent.obj", &GmshOptions::default());
+    let options = EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) };
+    let encoder = Encoder::new().options(options).domain(Domain::Conforming(&mesh));
+    let asset = encoder.encode(&solid).expect("encodes");
+    let report = prove(&asset, &ProveOptions::default(), |_| ControlFlow::Continue(())).expect("closed");
+    assert!(report.proved && report.signs.claims > 1000, "{report:#?}");
 }
 
 #[test]

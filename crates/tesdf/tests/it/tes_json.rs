@@ -8,8 +8,9 @@ use crate::support::random::Random;
 use crate::support::tetrahedra::grid;
 use tesdf::domain::ConformingMesh;
 use tesdf::encode::{Domain, EncodeOptions, Encoder, ImportJsonError, Refinement};
+use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
-use tesdf::verify::{ProveOptions, prove};
+use tesdf::verify::{ProveOptions, ProveReport, Verdict, VerifyOptions, VerifyReport, prove, verify};
 use tesdf::{Preset, Source, TeSdf};
 
 /// A tetrahedron with three right angles, and another over its slanted face.
@@ -45,9 +46,7 @@ fn a_file_by_hand_answers_from_its_lists() {
     let (inside, outside) = (DVec3::splat(0.1), DVec3::splat(0.5));
     assert!((asset.signed_distance(inside) + 0.1).abs() < 1e-15);
     assert!((asset.signed_distance(outside) - 0.5 / 3.0_f64.sqrt()).abs() < 1e-15);
-    let proof =
-        |asset: &TeSdf| prove(asset, &ProveOptions::default(), |_| ControlFlow::Continue(())).unwrap();
-    assert!(proof(&asset).proved, "{:?}", proof(&asset).faults);
+    assert!(proof(&asset, 1 << 20).proved, "{:?}", proof(&asset, 1 << 20).faults);
 
     // The corners may be in the other order, and the lists nested or flat.
     file["surface_inner_tetras"] = json!([[0, 1, 2, 3]]);
@@ -61,8 +60,17 @@ fn a_file_by_hand_answers_from_its_lists() {
     let asset = import(&file).unwrap();
     let off = DVec3::new(0.4, 0.4, 0.5).distance(DVec3::new(0.4, 0.4, 0.0));
     assert_eq!(asset.signed_distance(DVec3::new(0.4, 0.4, 0.5)), off);
-    let found = proof(&asset);
+    let found = proof(&asset, 1 << 20);
     assert_eq!((found.proved, found.distances.refuted), (false, 1));
+    assert!(!compared(&asset, 40).passed);
+}
+
+fn proof(asset: &TeSdf, pieces: u64) -> ProveReport {
+    prove(asset, &ProveOptions { pieces }, |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn compared(asset: &TeSdf, samples: usize) -> VerifyReport {
+    verify(asset, &VerifyOptions { samples, seed: 1 }, |_| ControlFlow::Continue(())).unwrap()
 }
 
 /// An asset of a block in a grid of tetrahedra.
@@ -121,6 +129,90 @@ fn what_is_written_and_read_again_answers_the_same() {
                 let [a, b, c, d] = t.map(|v| nodes[v]);
                 assert!((b - a).cross(c - a).dot(d - a) < 0.0, "{group}: {t:?}");
             }
+        }
+    }
+}
+
+/// The import of an asset after one list outside the surface was cut to the face that is farthest
+/// from the cell, and the cell.
+fn import_with_a_wrong_list(asset: &TeSdf, at: usize) -> (TeSdf, u32) {
+    let mut file: Value = serde_json::from_slice(&asset.to_json_bytes().unwrap()).unwrap();
+    let numbers =
+        |file: &Value, key: &str| -> Vec<usize> { serde_json::from_value(file[key].clone()).unwrap() };
+    let mut rest = numbers(&file, "encoded_faces_surface_outer");
+    let lengths = numbers(&file, "nums_of_encoded_faces_surface_outer");
+    let mut lists: Vec<Vec<usize>> = lengths.into_iter().map(|n| rest.drain(..n).collect()).collect();
+    let nodes: Vec<[f64; 3]> = ["surface_nodes", "inner_nodes", "outer_nodes"]
+        .iter()
+        .flat_map(|key| serde_json::from_value::<Vec<[f64; 3]>>(file[key].clone()).unwrap())
+        .collect();
+    let tetrahedra: Vec<[usize; 4]> = serde_json::from_value(file["surface_outer_tetras"].clone()).unwrap();
+    let faces: Vec<[usize; 3]> = serde_json::from_value(file["faces"].clone()).unwrap();
+    let at = at % lists.len();
+    let middle = tetrahedra[at].iter().map(|&v| DVec3::from_array(nodes[v])).sum::<DVec3>() / 4.0;
+    let far = |f: usize| {
+        let corners = faces[f].map(|v| DVec3::from_array(nodes[v]));
+        Triangle::new(corners).closest(middle).distance
+    };
+    let wrong = (0..faces.len()).max_by(|&a, &b| far(a).total_cmp(&far(b))).unwrap();
+    lists[at] = vec![wrong];
+    file["encoded_faces_surface_outer"] = json!(lists);
+    file.as_object_mut().unwrap().remove("nums_of_encoded_faces_surface_outer");
+    let asset = import(&file).unwrap();
+    let mut found = None;
+    asset.visit_cells(|cell| {
+        let centroid = cell.corners.into_iter().sum::<DVec3>() / 4.0;
+        if centroid.distance(middle) < 1e-12 {
+            found = Some(cell.id);
+        }
+    });
+    (asset, found.unwrap())
+}
+
+#[test]
+fn a_wrong_list_among_many_does_not_pass_and_is_named_with_its_amount() {
+    let good = block(Refinement::None);
+    let bytes = good.to_json_bytes().unwrap();
+    let again = TeSdf::import_json_bytes(&bytes, &Source::default()).unwrap();
+    let report = compared(&again, 200);
+    assert!(report.passed && !report.certified, "{report:#?}");
+    assert_eq!((report.cells, report.cell_points), (report.listed_cells, 4 * 200));
+    for precision in &report.precisions {
+        let points: usize = precision.classes.iter().map(|c| c.points).sum();
+        assert_eq!(points, 200 + report.cell_points, "each point is compared");
+        assert_eq!(precision.largest_error_beyond, Some(precision.largest_error));
+        assert!(precision.largest_error > 0.0 && precision.distance_mistakes == 0);
+    }
+    assert!(proof(&again, 1 << 20).proved, "{:?}", proof(&again, 1 << 20).faults);
+
+    let mut random = Random(11);
+    for turn in 0..12 {
+        let (asset, wrong_cell) = import_with_a_wrong_list(&good, random.index(10_000));
+        let report = compared(&asset, 200);
+        assert!(!report.passed && report.precisions.iter().all(|p| !p.passed), "{turn}: {report:#?}");
+        for precision in &report.precisions {
+            assert!(precision.distance_mistakes > 0 && precision.largest_error > 0.1, "{precision:#?}");
+            assert_eq!(precision.largest_error_beyond, Some(precision.largest_error));
+        }
+        // With one piece, more cells are undecided than are listed, but no refuted one is left out.
+        for pieces in [1 << 20, 1] {
+            let found = proof(&asset, pieces);
+            let refuted: Vec<_> = found.faults.iter().filter(|f| f.verdict == Verdict::Refuted).collect();
+            assert_eq!(
+                (found.distances.refuted, refuted.len(), found.signs.refuted),
+                (1, 1, 0),
+                "{found:#?}"
+            );
+            let (cell, by) = (refuted[0].cell.unwrap(), refuted[0].nearer_by.unwrap());
+            assert!(
+                cell == wrong_cell && by > 0.1 && found.nearer_by == Some(by),
+                "{wrong_cell}: {found:#?}"
+            );
+            assert_eq!(found.faults[0], *refuted[0], "refuted cells come first");
+            let undecided = found.faults.len() - 1;
+            assert_eq!(undecided, found.distances.undecided.min(ProveReport::UNDECIDED));
+            assert_eq!((undecided > 0, found.out_of_pieces > 0), (pieces == 1, pieces == 1));
+            assert_eq!((found.proved, found.signs.undecided), (false, 0));
         }
     }
 }

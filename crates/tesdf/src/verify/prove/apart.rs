@@ -39,9 +39,9 @@ pub fn are_apart(cell: &[DVec3; 4], face: &[DVec3; 3], gap: f64, error: f64) -> 
 ///
 /// It tries the planes through three of the seven corners, with the tetrahedron on one side and the
 /// face on the other, borders included. These are enough. The planes `n·x = d` that separate the
-/// corners in this way are a convex cone of `(n, d)`. It contains no line, because the tetrahedron is
-/// not flat. So if there is such a plane, there is one on an extreme ray of the cone. There three
-/// corners that are not collinear have `n·x = d`.
+/// corners in this way are a convex cone of `(n, d)`. It contains no line, because the tetrahedron
+/// is not flat. So if there is such a plane, there is one on an extreme ray of the cone. There
+/// three corners that are not collinear have `n·x = d`.
 pub fn is_beside(cell: &[DVec3; 4], face: &[DVec3; 3]) -> bool {
     let of_sides = SIDES.iter().map(|(side, _)| side.map(|k| cell[k]));
     let edges_of_cell = (0..4).flat_map(|j| (0..j).map(move |i| [cell[i], cell[j]]));
@@ -147,8 +147,8 @@ mod tests {
         (0..3).map(|k| a[k] * b[k]).sum()
     }
 
-    /// Whether a plane separates them that is parallel to a side or to an edge of each, in integers:
-    /// the directions of the sides of their Minkowski difference.
+    /// Whether a plane separates them that is parallel to a side or to an edge of each, in
+    /// integers: the directions of the sides of their Minkowski difference.
     fn is_beside_in_integers(cell: [Integers; 4], face: [Integers; 3]) -> bool {
         let [a, b, c] = face;
         let edges = [minus(b, a), minus(c, b), minus(a, c)];
