@@ -1,5 +1,6 @@
 //! Compares the time of impact with formulas, and with clearances at many earlier times.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use crate::support::meshes::named;
@@ -330,6 +331,73 @@ fn a_cast_by_a_small_angle_takes_a_few_steps() {
             assert!(impact.time <= expected && impact.time > expected - 1.1e-4, "{impact:?} {expected}");
         }
     }
+}
+
+/// The height of a box or a cylinder over the plane z = 0.
+fn height_over_plane(shape: &Shape, pose: Pose) -> f64 {
+    let down = pose.rotation.inverse() * DVec3::Z;
+    pose.translation.z
+        - match *shape {
+            Shape::Box { half_extents } => half_extents.dot(down.abs()),
+            Shape::Cylinder { half_height, radius } => {
+                half_height * down.z.abs() + radius * down.truncate().length()
+            }
+            _ => panic!("a box or a cylinder"),
+        }
+}
+
+#[test]
+fn fast_boxes_and_cylinders_touch_a_plane_when_formulas_say() {
+    let mut random = Random(5);
+    let mut vector = |size: f64| size * random.in_cube();
+    let coin = Shape::Cylinder { half_height: 0.01, radius: 0.1 };
+    let rod = Shape::Cylinder { half_height: 0.3, radius: 0.02 };
+    let block = Shape::Box { half_extents: DVec3::new(0.1, 0.2, 0.05) };
+    let options = TimeOfImpactOptions { tolerance: Length::Absolute(1e-6), end: 0.2, iterations: 1000 };
+    let (mut hits, mut most) = (0, 0);
+    for (k, shape) in (0..60).flat_map(|k| [&coin, &rod, &block].map(|shape| (k, shape))) {
+        let rotation = DQuat::from_scaled_axis(vector(3.0));
+        let pose = Pose::new(vector(0.05) + DVec3::Z * 0.35, rotation).expect("a pose");
+        let velocity = Velocity { linear: vector(2.0), angular: vector(40.0) };
+        // About the middle or any other point; flat on the plane at first.
+        let motion = match k % 3 {
+            0 => Motion::About { point: pose.translation + vector(0.05), velocity },
+            _ => Motion::Linear { velocity },
+        };
+        let pose = match k % 6 {
+            1 => Pose::at(DVec3::Z * (2e-6 - height_over_plane(shape, Pose::IDENTITY))),
+            _ => pose,
+        };
+        let case = Case::new(shape.clone(), pose, motion, Shape::Plane, Pose::IDENTITY, Motion::Rest);
+        let verdict = case.verdict(&options);
+        let until = verdict.free_until();
+        for sample in 0..2_000 {
+            let at = motion.pose_at(pose, until * f64::from(sample) / 2_000.0);
+            let height = height_over_plane(shape, at);
+            assert!(height > 0.0, "{k}, {shape:?}: {height} before {verdict:?}");
+        }
+        match verdict {
+            TimeOfImpact::Impact(impact) => {
+                let height = height_over_plane(shape, motion.pose_at(pose, impact.time));
+                assert!(height <= 1e-6 + 1e-12, "{k}, {shape:?}: {height} at {impact:?}");
+                hits += 1;
+            }
+            TimeOfImpact::Free { .. } => {}
+            TimeOfImpact::Undecided(_) => panic!("{k}, {shape:?}: {verdict:?}"),
+        }
+        most = most.max(verdict.iterations());
+    }
+    assert!(hits > 30 && most < 300, "{hits} {most}");
+}
+
+#[test]
+fn a_wheel_that_rolls_takes_one_step() {
+    let wheel = Shape::Cylinder { half_height: 0.02, radius: 0.1 };
+    let pose = Pose::new(DVec3::Z * (0.1 + 2e-6), DQuat::from_rotation_x(FRAC_PI_2)).expect("a pose");
+    let rolling = linear([10.0, 0.0, 0.0], [0.0, 100.0, 0.0]);
+    let case = Case::new(wheel, pose, rolling, Shape::Plane, Pose::IDENTITY, Motion::Rest);
+    let verdict = case.check(&TimeOfImpactOptions { end: 1.0, ..EXACT }, 20);
+    assert!(verdict.is_free() && verdict.iterations() <= 1, "{verdict:?}");
 }
 
 #[test]

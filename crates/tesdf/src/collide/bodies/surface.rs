@@ -213,6 +213,11 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
+    /// Whether it is that of a mesh.
+    pub fn is_mesh(&self) -> bool {
+        matches!(self.shape, Shape::Mesh(_))
+    }
+
     /// Whether the faces are those of a sheet, which has a surface on both sides of them.
     pub fn is_sheet(&self) -> bool {
         matches!(self.shape, Shape::Mesh(asset) if asset.half_thickness > 0.0)

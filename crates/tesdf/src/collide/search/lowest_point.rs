@@ -1,8 +1,9 @@
 //! The least signed distance over whole surfaces, by best-first search over their face trees.
 use crate::asset::layout::TreeChild;
 use crate::collide::bodies::branch::Branch;
-use crate::collide::bodies::field::FieldBody;
+use crate::collide::bodies::field::{Field, FieldBody};
 use crate::collide::bodies::surface::SurfaceBody;
+use crate::collide::scene::simple::Simple;
 use crate::collide::search::piece::{FLAT, Looks, Lowest, Piece, Rest};
 use crate::collide::search::queue::Queue;
 use crate::parallel::*;
@@ -20,6 +21,25 @@ impl Order<'_> {
     pub fn has_distances(&self) -> bool {
         let (center, _) = self.surface.face(0, &self.field, 0.0).ball();
         self.field.rough(center).0.is_finite()
+    }
+
+    /// Whether the lowest point is a node: that of a built-in shape over a plane, as the prism of a
+    /// cylinder has an edge where it is lowest.
+    fn is_lowest_at_node(&self) -> bool {
+        matches!(self.field.field, Field::Simple(Simple::Plane)) && !self.surface.is_mesh()
+    }
+
+    /// The lowest node of a built-in shape, at which its surface is as low.
+    fn lowest_node(&self) -> Option<Lowest> {
+        let of_node = |node: u32| {
+            let part = self.surface.node(node);
+            let point = *part.points().first()?;
+            let value = self.field.exact_value(point);
+            let (distance, radius) = (value.distance - part.radius, part.radius);
+            Some(Lowest { distance, face: self.surface.face_of_node(node), radius, point, value })
+        };
+        let nodes = (0..self.surface.node_count()).filter_map(of_node);
+        nodes.min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 }
 
@@ -133,8 +153,8 @@ impl<'a> Search<'a> {
             self.dive(order);
         }
         self.waiting = (1..self.orders.len()).collect();
-        if let Some(first) = self.orders.first() {
-            self.push(f64::NEG_INFINITY, 0, Item::Tree(first.surface.whole()));
+        if !self.orders.is_empty() {
+            self.push_whole(0);
         }
         let mut parts = 0;
         let mut bound = f64::INFINITY;
@@ -147,7 +167,7 @@ impl<'a> Search<'a> {
             let is_done = self.open.least().is_none_or(|bound| bound >= self.least() - self.tolerance);
             if overlap || is_done {
                 for order in std::mem::take(&mut self.waiting) {
-                    self.push(f64::NEG_INFINITY, order, Item::Tree(self.orders[order].surface.whole()));
+                    self.push_whole(order);
                 }
             }
             let batch = self.batch();
@@ -200,6 +220,13 @@ impl<'a> Search<'a> {
         self.open.push(bound, Open { order, item });
     }
 
+    /// Adds a whole surface, whose lowest point is not known yet.
+    fn push_whole(&mut self, order: usize) {
+        if !self.orders[order].is_lowest_at_node() {
+            self.push(f64::NEG_INFINITY, order, Item::Tree(self.orders[order].surface.whole()));
+        }
+    }
+
     /// The parts that are searched next, with their bounds.
     fn batch(&mut self) -> Vec<(f64, Open)> {
         let size = (self.open.len() / SHARE).clamp(1, BATCH);
@@ -226,8 +253,12 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Descends to a leaf where the surface is low, for a first upper bound.
+    /// Descends to a leaf where the surface is low, for a first upper bound; or finds the lowest point.
     fn dive(&mut self, order: usize) {
+        if self.orders[order].is_lowest_at_node() {
+            let lowest = self.orders[order].lowest_node();
+            return self.take(SearchedPart { order, lowest, open: Vec::new() });
+        }
         let Order { surface, field } = &self.orders[order];
         let mut looks = self.looks(order);
         let mut child = surface.whole();

@@ -59,7 +59,8 @@ const SHARE: f64 = 0.25;
 /// goes on to a later time, or is divided. So when two faces touch, everything is free up to then.
 pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
     let mut open = Queue::new();
-    let whole = [bodies[0].whole(), bodies[1].whole()];
+    let first = if bodies[1].is_plane() { bodies[0].whole_beside_plane() } else { bodies[0].whole() };
+    let whole = [first, bodies[1].whole()];
     open.push(0.0, Open { parts: whole, steps: 0 });
     let radius = bodies[0].radius + bodies[1].radius;
     let (mut looks, mut most) = (0, 0);
@@ -71,13 +72,13 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
         }
         let pair = PairAt { bodies: [bodies[0].at(time), bodies[1].at(time)], radius, time };
         let places = [0, 1].map(|k| pair.bodies[k].part(parts[k]));
-        let found = pair.parting(&places, limits.kept);
+        let found = pair.parting(&places, limits.kept, limits.end - time);
         let are_faces = parts.iter().all(MovingPart::is_face);
         if are_faces && found.distance <= limits.touching {
             return end(Outcome::Touch(time));
         }
         let next = time + found.free;
-        if next > limits.end {
+        if next >= limits.end {
             most = most.max(steps);
             return ControlFlow::Continue(());
         }

@@ -2,6 +2,7 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::asset::layout::TreeChild;
+use crate::base::elementary;
 use crate::collide::clearance::Body;
 use crate::collide::scene::cylinder::Cylinder;
 use crate::collide::scene::error::CollideError;
@@ -22,14 +23,16 @@ pub enum MovingPart {
     Face(u32),
     /// A part of a cylinder.
     OfCylinder(CylinderPart),
+    /// All of a box or cylinder, which has no parts beside a plane.
+    Convex,
 }
 
 impl MovingPart {
-    /// Whether it is flat and has no parts.
+    /// Whether it has no parts.
     pub fn is_face(&self) -> bool {
         match self {
             Self::Whole | Self::Half { .. } => false,
-            Self::Face(_) => true,
+            Self::Face(_) | Self::Convex => true,
             Self::OfCylinder(part) => part.is_face(),
         }
     }
@@ -93,10 +96,18 @@ impl<'a> MovingBody<'a> {
         if self.simple.len() == 1 { MovingPart::Face(0) } else { MovingPart::Whole }
     }
 
+    /// The whole surface beside a plane, of which only the extent along one direction matters.
+    pub fn whole_beside_plane(&self) -> MovingPart {
+        match self.shape {
+            Shape::Box { .. } | Shape::Cylinder { .. } => MovingPart::Convex,
+            _ => self.whole(),
+        }
+    }
+
     /// The parts of a part; none of a face.
     pub fn parts_of(&self, part: MovingPart) -> Vec<MovingPart> {
         let node = match (self.shape, part) {
-            (_, MovingPart::Face(_)) => return Vec::new(),
+            (_, MovingPart::Face(_) | MovingPart::Convex) => return Vec::new(),
             (Shape::Mesh(asset), MovingPart::Half { node, side }) => {
                 match TreeChild::decode(asset.tree_children[node as usize][usize::from(side)]) {
                     TreeChild::Node(node) => node,
@@ -187,6 +198,11 @@ impl BodyAt<'_> {
                     PartAt { center: self.place(center), extent: Extent::Box { halves } }
                 }
             }
+            (&Shape::Cylinder { half_height, radius }, MovingPart::Convex) => {
+                let [half_height, radius] = [half_height, radius].map(|size| size * self.body.placement.scale);
+                let axis = self.linear.z_axis.normalize_or_zero();
+                PartAt { center: self.place(DVec3::ZERO), extent: Extent::Cylinder { axis, half_height, radius } }
+            }
             (_, MovingPart::Face(face)) => of_face(&self.body.simple[face as usize]),
             (shape, _) => {
                 let bounds = shape.bounds();
@@ -200,30 +216,34 @@ impl BodyAt<'_> {
         self.body.is_plane().then(|| self.linear.z_axis.normalize_or_zero())
     }
 
-    /// Least component along `n` of the velocity of a part's points, now.
-    pub fn least_speed(&self, part: &PartAt, n: DVec3) -> f64 {
+    /// Component along `n` of the velocity of a part's middle, now.
+    pub fn speed(&self, part: &PartAt, n: DVec3) -> f64 {
         // n · (spin × r) = r · (n × spin)
-        let m = n.cross(self.spin);
-        if m == DVec3::ZERO {
-            return n.dot(self.drift);
-        }
-        n.dot(self.drift) + m.dot(part.center - self.center) - part.half_width(m)
+        n.dot(self.drift) + n.cross(self.spin).dot(part.center - self.center)
     }
 
-    /// Greatest distance of a part's points from the axis, at all times.
-    fn arm(&self, part: &PartAt) -> f64 {
-        let axis = self.spin.normalize_or_zero();
-        if axis == DVec3::ZERO {
-            0.0
-        } else {
-            (part.center - self.center).cross(axis).length() + part.reach()
+    /// The angular velocity of a part about its middle. A cylinder is the same however it turns about
+    /// its axis.
+    pub fn spin(&self, part: &PartAt) -> DVec3 {
+        match part.extent {
+            Extent::Cylinder { axis, .. } => self.spin - self.spin.dot(axis) * axis,
+            _ => self.spin,
         }
     }
 
-    /// The speed that the rotation gives a part's points at most, and the acceleration.
+    /// The speed that the rotation gives a part's points at most, and the acceleration, at all times.
     pub fn rotation(&self, part: &PartAt) -> (f64, f64) {
-        let (rate, arm) = (self.spin.length(), self.arm(part));
-        (rate * arm, rate * rate * arm)
+        let rate = self.spin.length();
+        // Of the middle, the distance from the axis.
+        let arm = (part.center - self.center).cross(self.spin.normalize_or_zero()).length();
+        let (tilting, reach) = (self.spin(part).length(), part.reach());
+        // A cylinder that does not turn about its own axis has the angular velocity `tilting`, which
+        // itself turns with its axis.
+        let turning = match part.extent {
+            Extent::Cylinder { axis, .. } => tilting + self.spin.dot(axis).abs(),
+            _ => rate,
+        };
+        (rate * arm + tilting * reach, rate * rate * arm + turning * tilting * reach)
     }
 
     /// Velocity of the axis.
@@ -256,6 +276,8 @@ enum Extent {
     Box { halves: [DVec3; 3] },
     /// The hull of one to three points; the last one is repeated.
     Hull { points: [DVec3; 3], count: usize },
+    /// A cylinder with a unit vector along its axis.
+    Cylinder { axis: DVec3, half_height: f64, radius: f64 },
 }
 
 impl PartAt {
@@ -266,6 +288,9 @@ impl PartAt {
             Extent::Hull { points, .. } => {
                 points.iter().map(|p| m.dot(self.center - *p)).fold(f64::NEG_INFINITY, f64::max)
             }
+            Extent::Cylinder { axis, half_height, radius } => {
+                half_height * m.dot(*axis).abs() + radius * m.cross(*axis).length()
+            }
         }
     }
 
@@ -274,13 +299,14 @@ impl PartAt {
         match &self.extent {
             Extent::Box { halves } => halves.iter().map(|half| half.length_squared()).sum::<f64>().sqrt(),
             Extent::Hull { points, .. } => points.iter().map(|p| p.distance(self.center)).fold(0.0, f64::max),
+            Extent::Cylinder { half_height, radius, .. } => elementary::hypot(*half_height, *radius),
         }
     }
 
     /// The points of a face.
     pub fn points(&self) -> Option<&[DVec3]> {
         match &self.extent {
-            Extent::Box { .. } => None,
+            Extent::Box { .. } | Extent::Cylinder { .. } => None,
             Extent::Hull { points, count } => Some(&points[..*count]),
         }
     }
@@ -288,7 +314,7 @@ impl PartAt {
     /// A face, whose last point is repeated where it has fewer than three.
     pub fn triangle(&self) -> Option<Triangle> {
         match self.extent {
-            Extent::Box { .. } => None,
+            Extent::Box { .. } | Extent::Cylinder { .. } => None,
             Extent::Hull { points, .. } => Some(Triangle::new(points)),
         }
     }
@@ -298,6 +324,7 @@ impl PartAt {
         let axes = match self.extent {
             Extent::Box { halves } => halves,
             Extent::Hull { points: [a, b, c], .. } => [(b - a).cross(c - a), DVec3::ZERO, DVec3::ZERO],
+            Extent::Cylinder { axis, .. } => [axis, DVec3::ZERO, DVec3::ZERO],
         };
         axes.into_iter().filter_map(DVec3::try_normalize)
     }

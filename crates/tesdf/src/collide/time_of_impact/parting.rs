@@ -19,6 +19,10 @@ pub struct Parting {
 /// Relative error of places and speeds, with a margin.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
+/// Number of halvings after which a free time is as good as the last one: what is left of a gap that
+/// closes falls to an eighth at each look.
+const HALVINGS: u32 = 3;
+
 /// Two bodies at a time.
 pub struct PairAt<'a> {
     /// The bodies. Only the second one can be a plane.
@@ -30,8 +34,8 @@ pub struct PairAt<'a> {
 }
 
 impl PairAt<'_> {
-    /// For how long two parts certainly stay farther apart than `kept`.
-    pub fn parting(&self, parts: &[PartAt; 2], kept: f64) -> Parting {
+    /// For how long two parts certainly stay farther apart than `kept`, of interest up to `horizon`.
+    pub fn parting(&self, parts: &[PartAt; 2], kept: f64, horizon: f64) -> Parting {
         let [(speed_a, bend_a), (speed_b, bend_b)] = [0, 1].map(|k| self.bodies[k].rotation(&parts[k]));
         let [a, b] = &self.bodies;
         let bound = Bound {
@@ -41,10 +45,14 @@ impl PairAt<'_> {
         let turned = self.time * (speed_a + speed_b);
         let rounding = ROUNDING * (a.size(&parts[0]) + b.size(&parts[1]) + turned);
         let mut found = Parting { distance: f64::NEG_INFINITY, free: 0.0, way: 0.0 };
+        let mut best = DVec3::ZERO;
         let mut offer = |n: DVec3| {
             let gap = self.gap(parts, n);
             found.distance = found.distance.max(gap);
-            found.free = found.free.max(bound.time(gap - kept - rounding, self.closing(parts, n)));
+            let free = bound.time(gap - kept - rounding, self.closing(parts, n));
+            if free > found.free {
+                (found.free, best) = (free, n);
+            }
         };
         if let Some(normal) = b.plane_normal() {
             offer(normal);
@@ -61,8 +69,31 @@ impl PairAt<'_> {
                 None => offer(between.normalize_or_zero()),
             }
         }
+        if found.free > 0.0 && found.free < horizon {
+            let left = |t| self.gap_after(parts, best, t) - kept - rounding - 0.5 * bound.bend * t * t;
+            found.free = longest(found.free, horizon, left);
+        }
         found.way = bound.speed * found.free;
         found
+    }
+
+    /// Lower bound of the gap of `gap` after the time `t`, apart from accelerations. A concave
+    /// function of the time.
+    fn gap_after(&self, parts: &[PartAt; 2], n: DVec3, t: f64) -> f64 {
+        let mut gap = -self.radius;
+        for (k, n) in [n, -n].into_iter().enumerate() {
+            let (body, part) = (&self.bodies[k], &parts[k]);
+            let turned = n + t * n.cross(body.spin(part));
+            gap += n.dot(part.center) + t * (body.speed(part, n) - self.speed_error(k, part));
+            gap -= part.half_width(turned);
+        }
+        gap
+    }
+
+    /// Error of the speeds of a part of body `k`.
+    fn speed_error(&self, k: usize, part: &PartAt) -> f64 {
+        let body = &self.bodies[k];
+        ROUNDING * (body.drift().length() + body.rotation_rate() * body.size(part))
     }
 
     /// The gap between two parallel planes that `n` is perpendicular to: the first part is beyond
@@ -74,14 +105,37 @@ impl PairAt<'_> {
 
     /// Upper bound of the speed at which this gap closes now. Negative when it grows.
     fn closing(&self, parts: &[PartAt; 2], n: DVec3) -> f64 {
-        let [a, b] = [0, 1].map(|k| {
-            let body = &self.bodies[k];
-            let n = if k == 0 { n } else { -n };
-            let size = body.drift().length() + body.rotation_rate() * body.size(&parts[k]);
-            ROUNDING * size - body.least_speed(&parts[k], n)
+        let [a, b] = [(0, n), (1, -n)].map(|(k, n)| {
+            let (body, part) = (&self.bodies[k], &parts[k]);
+            let turning = part.half_width(n.cross(body.spin(part)));
+            self.speed_error(k, part) + turning - body.speed(part, n)
         });
         a + b
     }
+}
+
+/// A time up to `horizon`, and near the last one, until which `left` is not negative. It is concave and
+/// positive at 0. Not less than `known`, a time of which the same is known.
+fn longest(known: f64, horizon: f64, left: impl Fn(f64) -> f64) -> f64 {
+    // With a margin for rounding.
+    let is_free = |t: f64| left(t * (1.0 + 1e-12)) >= 0.0;
+    if is_free(horizon) {
+        return horizon;
+    }
+    let (mut free, mut beyond) = (known, 2.0 * known);
+    while beyond < horizon && is_free(beyond) {
+        (free, beyond) = (beyond, 2.0 * beyond);
+    }
+    beyond = beyond.min(horizon);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (free + beyond);
+        if is_free(middle) {
+            free = middle;
+        } else {
+            beyond = middle;
+        }
+    }
+    free
 }
 
 /// The distance of two faces and the direction from the second to the first. `None` for other
@@ -187,7 +241,7 @@ mod tests {
                     let start = 0.2;
                     let parting = |time: f64| {
                         let pair = pair(time);
-                        pair.parting(&[0, 1].map(|k| pair.bodies[k].part(parts[k])), kept)
+                        pair.parting(&[0, 1].map(|k| pair.bodies[k].part(parts[k])), kept, 20.0)
                     };
                     let faces = |time: f64| {
                         let pair = pair(time);
