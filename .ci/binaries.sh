@@ -63,11 +63,25 @@ for target in "${targets[@]}"; do
     # It writes one beside each manifest.
     find crates python -maxdepth 2 -name sbom.json -delete
 
+    # Where the program can run here, also in an emulator, it encodes to the bytes of the host.
+    run=()
+    case $target in
+    "$host") ;;
+    aarch64-*-linux-*) command -v qemu-aarch64-static >/dev/null && run=(qemu-aarch64-static -L /usr/aarch64-linux-gnu) || run=(false) ;;
+    *) run=(false) ;;
+    esac
+    if [ "${run[*]}" = false ]; then
+        echo "warning: $target cannot run here; its program is not tested" >&2
+    else
+        step "binaries" "${run[@]}" "$program" encode data/procedural/shaft_keyway.obj -o "$binaries/$target.tesdf" >/dev/null
+        "${run[@]}" "$program" --version | tee /dev/stderr | grep -q "($(git log -1 --abbrev=7 --format='%h %cs'))" ||
+            { echo "error: tesdf --version does not name this commit" >&2; exit 1; }
+        cmp "$binaries/$host.tesdf" "$binaries/$target.tesdf"
+    fi
+
     # The manual and completions are those of every target.
     case $target in
     "$host")
-        "$program" --version | tee /dev/stderr | grep -q "($(git log -1 --abbrev=7 --format='%h %cs'))" ||
-            { echo "error: tesdf --version does not name this commit" >&2; exit 1; }
         rm -rf "$binaries/texts"
         mkdir -p "$binaries/texts/man" "$binaries/texts/completions"
         for shell in bash elvish fish powershell zsh; do
@@ -87,5 +101,5 @@ for target in "${targets[@]}"; do
     (cd "$binaries" && pack "$name")
     rm -rf "$folder"
 done
-rm -rf "$binaries/texts"
+rm -rf "$binaries/texts" "$binaries"/*.tesdf
 .ci/checksums.sh "$binaries"

@@ -102,7 +102,8 @@ fn asset_as_json(args: &Args) -> Result<Outcome, Failure> {
         )));
     }
     let output = output::open(&args.output, slice::from_ref(&args.run), args.consent)?;
-    if !args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json")) {
+    let is_json = args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
+    if !is_json && !output.is_stdout() {
         let found = args.output.display();
         return Err(Failure::new(format!(
             "{found}: a .tesdf file is exported as JSON; expected a name in .json"

@@ -42,6 +42,8 @@ fn a_file_is_imported_verified_and_exported() {
     folder.good(&["export", "again.tesdf", "-o", "third.json"]);
     let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
     assert_eq!(read("again.json"), read("third.json"));
+    let (code, text, _) = folder.tesdf(&["export", "again.tesdf", "-o", "-"]);
+    assert_eq!((code, text), (Some(0), read("third.json")));
 
     // The outer list has a face that is nowhere the nearest: at the slanted face, the distance is
     // up to 1 instead of 0.

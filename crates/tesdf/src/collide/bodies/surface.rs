@@ -14,7 +14,7 @@ use crate::collide::mode::Mode;
 use crate::collide::scene::cylinder::Cylinder;
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
-use crate::collide::scene::simple::{Points, Simple, plane_square};
+use crate::collide::scene::simple::{Simple, plane_square};
 use crate::geometry::{Aabb, Triangle};
 use crate::query::Facing;
 
@@ -290,12 +290,7 @@ impl<'a> SurfaceBody<'a> {
                     .copied()
                     .any(|other| shares(&asset.faces[other as usize]) && !is_level(other) && accept(other))
             }
-            simple => {
-                let simple = Simple::from(simple);
-                let own = simple.part(face);
-                let shares = |other: &Points| corners.iter().all(|&k| other.contains(&own[k]));
-                (0..).zip(simple.parts()).any(|(other, points)| shares(&points) && accept(other))
-            }
+            simple => Simple::from(simple).any_with(face, corners, accept),
         }
     }
 

@@ -79,6 +79,26 @@ impl Cylinder {
         }
     }
 
+    /// The faces that may have these corners of a face: of the two sectors at an edge, or of an end
+    /// around its middle.
+    pub fn faces_with(face: u32, corners: &[usize]) -> ArrayVec<u32, { SECTORS as usize }> {
+        let (sector, kind) = (face / FACES_PER_SECTOR, face % FACES_PER_SECTOR);
+        let edge = |corner: &usize| match (kind, corner) {
+            (0 | 1, 0) => Some(sector),
+            (0, _) | (1, 1) | (2, 1) | (3, 2) => Some(sector + 1),
+            (2 | 3, 0) => None,
+            _ => Some(sector),
+        };
+        match corners.iter().find_map(edge) {
+            Some(edge) => {
+                let sectors = [edge + SECTORS - 1, edge].map(|sector| sector % SECTORS);
+                let faces = |sector| FACES_PER_SECTOR * sector..FACES_PER_SECTOR * (sector + 1);
+                sectors.into_iter().flat_map(faces).collect()
+            }
+            None => (0..SECTORS).map(|sector| FACES_PER_SECTOR * sector + kind).collect(),
+        }
+    }
+
     /// A corner of the prism: 2k and 2k + 1 are the ends of edge k, then come the middles of both
     /// ends.
     pub fn node(&self, node: u32) -> DVec3 {
@@ -177,6 +197,22 @@ mod tests {
                 _ => (closest.z - h).abs(),
             };
             assert!(on_side < 1e-14, "case {case}: {closest} is on side {side}");
+        }
+    }
+
+    #[test]
+    fn the_faces_with_some_corners_are_those_of_all_faces() {
+        let cylinder = Cylinder { half_height: 2.0, radius: 0.5 };
+        let all = 0..SECTORS * FACES_PER_SECTOR;
+        for face in all.clone() {
+            let own = cylinder.face(face);
+            for corners in [&[0][..], &[1], &[2], &[0, 1], &[1, 2], &[2, 0]] {
+                let has_them = |other: &u32| corners.iter().all(|&k| cylinder.face(*other).contains(&own[k]));
+                let mut found = Cylinder::faces_with(face, corners);
+                found.retain(|other| has_them(other));
+                found.sort_unstable();
+                assert!(found.iter().copied().eq(all.clone().filter(has_them)), "{face} {corners:?}");
+            }
         }
     }
 

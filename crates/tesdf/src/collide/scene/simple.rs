@@ -125,6 +125,19 @@ impl Simple {
         (0..self.part_count()).map(move |part| simple.part(part))
     }
 
+    /// Whether one of the parts that have these corners of a part is accepted; `part` itself may be, too.
+    pub fn any_with(&self, part: u32, corners: &[usize], mut accept: impl FnMut(u32) -> bool) -> bool {
+        let own = self.part(part);
+        let mut accept = |other: u32| {
+            let points = self.part(other);
+            corners.iter().all(|&k| points.contains(&own[k])) && accept(other)
+        };
+        match self {
+            Self::Cylinder(_) => Cylinder::faces_with(part, corners).into_iter().any(accept),
+            _ => (0..self.part_count()).any(&mut accept),
+        }
+    }
+
     /// The parts, with an edge of the prism of a cylinder on the side against `normal`: what is
     /// lowest over a plane with this normal is then on them.
     pub fn parts_against(&self, normal: DVec3) -> impl Iterator<Item = Points> {
