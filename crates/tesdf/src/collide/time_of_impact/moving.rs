@@ -199,9 +199,13 @@ impl BodyAt<'_> {
                 }
             }
             (&Shape::Cylinder { half_height, radius }, MovingPart::Convex) => {
-                let [half_height, radius] = [half_height, radius].map(|size| size * self.body.placement.scale);
+                let [half_height, radius] =
+                    [half_height, radius].map(|size| size * self.body.placement.scale);
                 let axis = self.linear.z_axis.normalize_or_zero();
-                PartAt { center: self.place(DVec3::ZERO), extent: Extent::Cylinder { axis, half_height, radius } }
+                PartAt {
+                    center: self.place(DVec3::ZERO),
+                    extent: Extent::Cylinder { axis, half_height, radius },
+                }
             }
             (_, MovingPart::Face(face)) => of_face(&self.body.simple[face as usize]),
             (shape, _) => {
