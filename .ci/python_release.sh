@@ -35,8 +35,11 @@ in_newton() {
             in_environment newton -m pytest $tests/test_newton_device.py
 }
 in_release() {
-    step "MJWarp, PyTorch, Ray, Chromium, rerun, USD" in_environment release -m pytest $tests --ignore $tests/test_newton.py \
-        --ignore $tests/test_newton_device.py --ignore $tests/test_no_device.py --ignore $tests/test_mujoco_warp_device.py &&
+    step "MJWarp, PyTorch, JAX, Chromium, rerun, USD" in_environment release -m pytest $tests --ignore $tests/test_newton.py \
+        --ignore $tests/test_newton_device.py --ignore $tests/test_no_device.py --ignore $tests/test_mujoco_warp_device.py \
+        --ignore $tests/test_ray.py &&
+        # Ray forks, which a process with JAX must not do.
+        step "Ray" in_environment release -m pytest $tests/test_ray.py &&
         # With MJWarp, PyTorch, rerun and USD, whose types `.ci/python.sh` does not see.
         step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt &&
         step "MJWarp example" in_environment release $tests/unoptimised_kernels.py examples/python/mujoco_warp_nuts_on_bolts.py &&

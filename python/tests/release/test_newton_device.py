@@ -74,5 +74,5 @@ def test_what_does_not_fit_is_an_error(screw, by_newton, monkeypatch):
 def test_other_forms_are_copied(screw, by_newton, monkeypatch):
     """Contacts that only the processor can choose."""
     monkeypatch.setattr(tesdf.newton, "cuda_number", lambda device: 0)
-    narrow_phase, _ = collided(screw, 40_000, device="cuda:0", contacts_per="minimum")
+    narrow_phase, _ = collided(screw, 40_000, device="cuda:0", mode="exact", contacts_per="minimum")
     assert type(narrow_phase.last) is tesdf.Contacts and len(narrow_phase.last) > 0

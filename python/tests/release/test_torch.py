@@ -224,9 +224,9 @@ def test_contacts_by_both_poses(asset, random, options, move):
             for name in names.keys() & name_up.keys() & name_down.keys():
                 middle = found.distance[names[name]].item()
                 slopes = [(up.distance[name_up[name]] - middle) / STEP, (middle - down.distance[name_down[name]]) / STEP]
-                if abs(slopes[0] - slopes[1]) < 1e-5 * max(1, abs(slopes[0])):  # no kink between
+                if abs(slopes[0] - slopes[1]) < 1e-6 * max(1, abs(slopes[0])):  # no kink between
                     compared += 1
-                    assert rows[names[name]][k].item() == pytest.approx((sum(slopes) / 2).item(), abs=1e-5, rel=1e-5)
+                    assert rows[names[name]][k].item() == pytest.approx((sum(slopes) / 2).item(), abs=1e-6, rel=1e-6)
     assert compared > 30
 
 
