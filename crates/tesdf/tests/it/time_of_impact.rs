@@ -224,6 +224,24 @@ fn random_motions_are_free_before_the_impact_and_touch_at_it() {
 }
 
 #[test]
+fn times_are_known_to_tolerances_of_a_few_rounding_errors() {
+    let mut random = Random(8);
+    let ball = asset(&Surface::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid());
+    let tetra = boxed(DVec3::new(0.9, 0.2, 0.4));
+    for _ in 0..12 {
+        let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 6.0));
+        let from = 3.0 * random.direction();
+        let start = Pose::new(from, turn).expect("a pose");
+        let motion = linear((-from).to_array(), random.in_cube().to_array());
+        let case = Case::new(ball.clone(), start, motion, tetra.clone(), Pose::IDENTITY, Motion::Rest);
+        let options = |tolerance| TimeOfImpactOptions { tolerance: Length::Absolute(tolerance), ..EXACT };
+        let rough = case.impact(&options(1e-7)).time;
+        let fine = case.impact(&options(1e-12)).time;
+        assert!(rough <= fine && fine - rough < 1e-6, "{rough} {fine}");
+    }
+}
+
+#[test]
 fn bodies_in_contact_at_the_start_have_time_0() {
     let cube = boxed(DVec3::ONE);
     for (height, distance) in [(0.25, -0.25), (1.5, -0.5), (2.0, 0.0), (2.0 + 5e-7, 5e-7)] {

@@ -1,5 +1,6 @@
 //! How long two parts of moving surfaces certainly stay apart, by a plane between them. Proof:
 //! `docs/math.md`, section 17.
+use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use crate::collide::time_of_impact::moving::{BodyAt, PartAt};
@@ -53,6 +54,7 @@ impl PairAt<'_> {
             if free > found.free {
                 (found.free, best) = (free, n);
             }
+            free
         };
         if let Some(normal) = b.plane_normal() {
             offer(normal);
@@ -63,10 +65,12 @@ impl PairAt<'_> {
             }
             match least_distance(parts) {
                 Some((distance, n)) => {
-                    offer(n);
+                    if offer(n) == 0.0 {
+                        across_edges(parts, n).for_each(|n| _ = offer(n));
+                    }
                     found.distance = distance - self.radius;
                 }
-                None => offer(between.normalize_or_zero()),
+                None => _ = offer(between.normalize_or_zero()),
             }
         }
         if found.free > 0.0 && found.free < horizon {
@@ -147,6 +151,29 @@ fn least_distance(parts: &[PartAt; 2]) -> Option<(f64, DVec3)> {
     let closest = triangle.closest(at);
     Some((closest.distance, (at - closest.point).normalize_or_zero()))
 }
+
+/// Directions near `n`, the one between the nearest points of two faces, which is rough where these
+/// are only some rounding errors apart. What faces hold between them is perpendicular to their
+/// edges: to one from a vertex to an edge, to two between edges. Faces have their normals.
+fn across_edges(parts: &[PartAt; 2], n: DVec3) -> impl Iterator<Item = DVec3> {
+    let edges = [0, 1].map(|k| {
+        let points = parts[k].points().unwrap_or_default();
+        let edge = move |i: usize| (points[(i + 1) % points.len()] - points[i]).try_normalize();
+        (0..points.len()).filter_map(edge).collect::<ArrayVec<DVec3, 3>>()
+    });
+    let [a, b] = edges.clone();
+    let to_edge = edges.into_iter().flatten().map(move |edge| n.reject_from_normalized(edge));
+    let between = a.into_iter().flat_map(move |a| b.clone().into_iter().map(move |b| a.cross(b)));
+    let near = move |m: DVec3| {
+        let m = m.try_normalize()?;
+        let m = if m.dot(n) < 0.0 { -m } else { m };
+        (m.dot(n) > NEAR).then_some(m)
+    };
+    to_edge.chain(between).filter_map(near)
+}
+
+/// Cosine of the angle by which a rough direction may be off.
+const NEAR: f64 = 0.99;
 
 /// Bounds of the motion of the points of one part against those of another.
 struct Bound {
