@@ -40,8 +40,9 @@ in_release() {
         --ignore $tests/test_ray.py &&
         # Ray forks, which a process with JAX must not do.
         step "Ray" in_environment release -m pytest $tests/test_ray.py &&
-        # With MJWarp, PyTorch, rerun and USD, whose types `.ci/python.sh` does not see.
-        step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt &&
+        # With MJWarp, PyTorch, rerun and USD, whose types `.ci/python.sh` does not see. Other packages may lack types.
+        step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt \
+            --mypy-config-file python/tests/mypy.ini &&
         step "MJWarp example" in_environment release $tests/unoptimised_kernels.py examples/python/mujoco_warp_nuts_on_bolts.py &&
         step "PyTorch example" in_environment release examples/python/peg_finds_hole.py &&
         step "PyTorch example" in_environment release examples/python/grasps_without_collision.py &&
