@@ -46,13 +46,14 @@ impl PairAt<'_> {
         let turned = self.time * (speed_a + speed_b);
         let rounding = ROUNDING * (a.size(&parts[0]) + b.size(&parts[1]) + turned);
         let mut found = Parting { distance: f64::NEG_INFINITY, free: 0.0, way: 0.0 };
-        let mut best = DVec3::ZERO;
+        let mut best = None;
         let mut offer = |n: DVec3| {
             let gap = self.gap(parts, n);
-            found.distance = found.distance.max(gap);
-            let free = bound.time(gap - kept - rounding, self.closing(parts, n));
+            let now = gap.after(0.0);
+            found.distance = found.distance.max(now);
+            let free = bound.time(now - kept - rounding, gap.closing());
             if free > found.free {
-                (found.free, best) = (free, n);
+                (found.free, best) = (free, Some(gap));
             }
             free
         };
@@ -73,53 +74,59 @@ impl PairAt<'_> {
                 None => _ = offer(between.normalize_or_zero()),
             }
         }
-        if found.free > 0.0 && found.free < horizon {
-            let left = |t| self.gap_after(parts, best, t) - kept - rounding - 0.5 * bound.bend * t * t;
+        if let Some(gap) = best.filter(|_| found.free < horizon) {
+            let left = |t| gap.after(t) - kept - rounding - 0.5 * bound.bend * t * t;
             found.free = longest(found.free, horizon, left);
         }
         found.way = bound.speed * found.free;
         found
     }
 
-    /// Lower bound of the gap of `gap` after the time `t`, apart from accelerations. A concave
-    /// function of the time.
-    fn gap_after(&self, parts: &[PartAt; 2], n: DVec3, t: f64) -> f64 {
-        let mut gap = -self.radius;
-        for (k, n) in [n, -n].into_iter().enumerate() {
-            let (body, part) = (&self.bodies[k], &parts[k]);
-            let turned = n + t * n.cross(body.spin(part));
-            gap += n.dot(part.center) + t * (body.speed(part, n) - self.speed_error(k, part));
-            gap -= part.half_width(turned);
-        }
-        gap
-    }
-
-    /// Error of the speeds of a part of body `k`.
-    fn speed_error(&self, k: usize, part: &PartAt) -> f64 {
-        let body = &self.bodies[k];
-        ROUNDING * (body.drift().length() + body.rotation_rate() * body.size(part))
-    }
-
-    /// The gap between two parallel planes that `n` is perpendicular to: the first part is beyond
-    /// the one, the second part before the other.
-    fn gap(&self, parts: &[PartAt; 2], n: DVec3) -> f64 {
-        let widths = parts[0].half_width(n) + parts[1].half_width(-n);
-        n.dot(parts[0].center - parts[1].center) - widths - self.radius
-    }
-
-    /// Upper bound of the speed at which this gap closes now. Negative when it grows.
-    fn closing(&self, parts: &[PartAt; 2], n: DVec3) -> f64 {
-        let [a, b] = [(0, n), (1, -n)].map(|(k, n)| {
-            let (body, part) = (&self.bodies[k], &parts[k]);
-            let turning = part.half_width(n.cross(body.spin(part)));
-            self.speed_error(k, part) + turning - body.speed(part, n)
+    /// The gap of two parts along `n`, which is about from the second to the first.
+    fn gap<'a>(&self, parts: &'a [PartAt; 2], n: DVec3) -> Gap<'a> {
+        let sides = [(0, n), (1, -n)];
+        let turning = sides.map(|(k, n)| n.cross(self.bodies[k].spin(&parts[k])));
+        let speeds = sides.map(|(k, n)| self.bodies[k].speed(&parts[k], n));
+        let errors = [0, 1].map(|k| {
+            let body = &self.bodies[k];
+            ROUNDING * (body.drift().length() + body.rotation_rate() * body.size(&parts[k]))
         });
-        a + b
+        Gap { parts, n, turning, speeds, errors, radius: self.radius }
     }
 }
 
-/// A time up to `horizon`, and near the last one, until which `left` is not negative. It is concave and
-/// positive at 0. Not less than `known`, a time of which the same is known.
+/// The gap between two parallel planes that `n` is perpendicular to: the first part is beyond the
+/// one, the second part before the other.
+struct Gap<'a> {
+    parts: &'a [PartAt; 2],
+    n: DVec3,
+    /// By this, `n` and `-n` turn against each part per unit of time, at first.
+    turning: [DVec3; 2],
+    /// The speeds of the middles of the parts along `n` and `-n` now, and their errors.
+    speeds: [f64; 2],
+    errors: [f64; 2],
+    radius: f64,
+}
+
+impl Gap<'_> {
+    /// Lower bound after the time `t`, apart from accelerations. A concave function of the time, and
+    /// the gap itself at 0.
+    fn after(&self, t: f64) -> f64 {
+        let Self { parts: [a, b], n, turning, .. } = self;
+        let opening = (self.speeds[0] - self.errors[0]) + (self.speeds[1] - self.errors[1]);
+        let widths = a.half_width(*n + t * turning[0]) + b.half_width(-*n + t * turning[1]);
+        n.dot(a.center - b.center) + t * opening - widths - self.radius
+    }
+
+    /// Upper bound of the speed at which it closes now. Negative when it grows.
+    fn closing(&self) -> f64 {
+        let of_part = |k: usize| self.errors[k] + self.parts[k].half_width(self.turning[k]) - self.speeds[k];
+        of_part(0) + of_part(1)
+    }
+}
+
+/// A time up to `horizon`, and near the last one, until which `left` is not negative. It is concave
+/// and positive at 0. Not less than `known`, a time of which the same is known.
 fn longest(known: f64, horizon: f64, left: impl Fn(f64) -> f64) -> f64 {
     // With a margin for rounding.
     let is_free = |t: f64| left(t * (1.0 + 1e-12)) >= 0.0;
