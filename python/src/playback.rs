@@ -107,9 +107,8 @@ const FEWEST: u64 = 50;
 fn of_notebook(record: &RunRecord) -> Frames {
     let last = record.times().len().saturating_sub(1);
     let every = last.div_ceil(OF_NOTEBOOK).max(1);
-    let mut recorded = record.contacts().map(|(step, _)| step);
-    let between = match (recorded.next(), recorded.next()) {
-        (Some(first), Some(second)) if (second - first) * FEWEST <= last as u64 => (second - first) as usize,
+    let between = match record.contact_steps() {
+        [first, second, ..] if (second - first) * FEWEST <= last as u64 => (second - first) as usize,
         _ => 1,
     };
     Frames::Every(NonZeroUsize::new(every.next_multiple_of(between)).unwrap_or(NonZeroUsize::MIN))

@@ -1,5 +1,5 @@
 //! The contacts of a run's frames.
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use tesdf::collide::{CollideError, CollideOptions, Contact, detect_until};
@@ -101,9 +101,10 @@ impl Playback<'_> {
     /// Whether the run has recorded the contacts of all frames but the last one, whose step has none,
     /// so that [`contacts`](Self::contacts) detects those of this one at most.
     pub fn has_recorded_contacts(&self) -> bool {
-        let recorded: BTreeSet<u64> = self.record.contacts().map(|(step, _)| step).collect();
+        let recorded = self.record.contact_steps();
         let others = &self.steps[..self.steps.len().saturating_sub(1)];
-        self.is_near() && !recorded.is_empty() && others.iter().all(|&step| recorded.contains(&(step as u64)))
+        let is_recorded = |&step: &usize| recorded.binary_search(&(step as u64)).is_ok();
+        self.is_near() && !recorded.is_empty() && others.iter().all(is_recorded)
     }
 
     /// Whether the run is so near to the origin that recorded points are precise.

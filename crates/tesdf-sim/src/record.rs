@@ -340,6 +340,11 @@ impl RunRecord {
         Some([DVec3::new(x, y, z), DVec3::new(i, j, k)])
     }
 
+    /// The steps with recorded contacts, in order.
+    pub fn contact_steps(&self) -> &[u64] {
+        &self.contact_steps
+    }
+
     /// The steps with recorded contacts, each with its contacts.
     pub fn contacts(&self) -> impl Iterator<Item = (u64, Vec<RecordedContact>)> {
         let contact = |k: usize| RecordedContact {
@@ -490,6 +495,7 @@ impl RunRecord {
             && starts.first() == Some(&0)
             && starts.last() == Some(&(contacts as u64))
             && starts.is_sorted()
+            && self.contact_steps.is_sorted_by(|a, b| a < b)
             && self.hidden.fit(self.times.len() as u64, self.bodies.len())
             && self.forces.fit(self.times.len() as u64, self.bodies.len(), self.joints.len());
         if fits {

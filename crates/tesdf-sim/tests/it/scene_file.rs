@@ -304,6 +304,17 @@ fn files_that_are_no_runs_are_refused() {
 }
 
 #[test]
+fn runs_whose_steps_of_contacts_do_not_ascend_are_refused() {
+    let system = tesdf_sim::System::new(DVec3::ZERO);
+    for (steps, is_run) in [(&[][..], true), (&[0, 3], true), (&[3, 3], false), (&[3, 0], false)] {
+        let mut record = RunRecord::new(&system, "scene".into());
+        steps.iter().for_each(|&step| record.push_contacts(step, &[], &system));
+        let opened = RunRecord::from_bytes(&record.to_bytes().unwrap());
+        assert_eq!(opened.is_ok(), is_run, "{steps:?}: {opened:?}");
+    }
+}
+
+#[test]
 fn a_run_can_be_stopped() {
     let loaded = load(DROP).unwrap();
     let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
