@@ -28,9 +28,9 @@ const CHUNK: usize = 1 << 19;
 /// An encoded mesh with exact signed distances, closest points and gradients. encode makes it, open
 /// reads it from a file. It is immutable: methods that move its vertices return another asset.
 ///
-/// All lengths are in the mesh's unit. Points are arrays [N, 3], or one point [3]; contiguous float64 arrays are read
-/// in place. Queries run on all cores (RAYON_NUM_THREADS sets the number of threads) and release
-/// the interpreter's lock.
+/// All lengths are in the mesh's unit. Points are arrays [N, 3], or one point [3]; contiguous
+/// float64 arrays are read in place. Queries run on all cores (RAYON_NUM_THREADS sets the number of
+/// threads) and release the interpreter's lock.
 #[pyclass(frozen, module = "tesdf")]
 pub struct Asset {
     /// Shared with scenes.

@@ -9,6 +9,7 @@ use tesdf::base::Named;
 use tesdf::collide::{CollideOptions, FaceOptions, ModeChoices, Reduction};
 
 use crate::errors::{Error, argument, kind_of};
+use crate::whole::Whole;
 
 /// The keywords, in the order of the documentation.
 const NAMES: &str = "mode, contacts_per, contact_distance, speculative_time, cos_theta, iterations, tolerance, reduce, \
@@ -98,7 +99,7 @@ fn number(name: &str, any: &Bound<'_, PyAny>) -> PyResult<f64> {
 }
 
 fn count(name: &str, any: &Bound<'_, PyAny>) -> PyResult<u32> {
-    any.extract().map_err(|_| argument(name, shown(any), "an integer from 0 to 2^32 - 1"))
+    any.extract().map_err(|_| argument(name, shown(any), u32::RANGE))
 }
 
 fn threads(name: &str, any: &Bound<'_, PyAny>) -> PyResult<NonZeroUsize> {

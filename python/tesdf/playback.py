@@ -20,7 +20,8 @@ _Path = Union[str, "PathLike[str]"]
 
 _Run = Union[_Path, _native.Simulation, Record]
 
-# Notebooks keep what they show, so a page in one has at most this many bytes, and fewer states than a file.
+# Notebooks keep what they show, so a page in one has at most this many bytes, and fewer states than a
+# file.
 _NOTEBOOK_BYTES = 8_000_000
 
 

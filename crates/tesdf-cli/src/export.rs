@@ -1,7 +1,7 @@
 //! `tesdf export RUN -o run.glb`: a recorded run as an animated GLB file. `tesdf export FILE.tesdf
 //! -o FILE.json`: an asset as JSON of TES-Encoder.
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::slice;
 
 use crate::terminal::asset_file;
@@ -66,7 +66,7 @@ impl FrameArgs {
 /// The asset cannot be opened or has no conforming domain. The run or a geometry cannot be opened, a
 /// state is not valid, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    if args.run.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("tesdf")) {
+    if has_extension(&args.run, "tesdf") {
         return asset_as_json(args);
     }
     let interrupted = interrupt::flag();
@@ -102,8 +102,7 @@ fn asset_as_json(args: &Args) -> Result<Outcome, Failure> {
         )));
     }
     let output = output::open(&args.output, slice::from_ref(&args.run), args.consent)?;
-    let is_json = args.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
-    if !is_json && !output.is_stdout() {
+    if !has_extension(&args.output, "json") && !output.is_stdout() {
         let found = args.output.display();
         return Err(Failure::new(format!(
             "{found}: a .tesdf file is exported as JSON; expected a name in .json"
@@ -119,4 +118,8 @@ fn asset_as_json(args: &Args) -> Result<Outcome, Failure> {
         ("size", format!("{:.2} MB", bytes.len() as f64 / 1e6)),
     ])?;
     Ok(Outcome::Good)
+}
+
+fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }

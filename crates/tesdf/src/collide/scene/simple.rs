@@ -125,16 +125,17 @@ impl Simple {
         (0..self.part_count()).map(move |part| simple.part(part))
     }
 
-    /// Whether one of the parts that have these corners of a part is accepted; `part` itself may be, too.
+    /// Whether one of the parts that have these corners of a part is accepted; `part` itself may be,
+    /// too.
     pub fn any_with(&self, part: u32, corners: &[usize], mut accept: impl FnMut(u32) -> bool) -> bool {
         let own = self.part(part);
-        let mut accept = |other: u32| {
+        let accept = |other: u32| {
             let points = self.part(other);
             corners.iter().all(|&k| points.contains(&own[k])) && accept(other)
         };
         match self {
             Self::Cylinder(_) => Cylinder::faces_with(part, corners).into_iter().any(accept),
-            _ => (0..self.part_count()).any(&mut accept),
+            _ => (0..self.part_count()).any(accept),
         }
     }
 

@@ -253,7 +253,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Descends to a leaf where the surface is low, for a first upper bound; or finds the lowest point.
+    /// Descends to a leaf where the surface is low, for a first upper bound; or finds the lowest
+    /// point.
     fn dive(&mut self, order: usize) {
         if self.orders[order].is_lowest_at_node() {
             let lowest = self.orders[order].lowest_node();
