@@ -224,7 +224,7 @@ fn random_motions_are_free_before_the_impact_and_touch_at_it() {
 }
 
 #[test]
-fn times_are_known_to_tolerances_of_a_few_rounding_errors() {
+fn times_and_normals_are_known_to_tolerances_of_a_few_rounding_errors() {
     let mut random = Random(8);
     let ball = asset(&Surface::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid());
     let tetra = boxed(DVec3::new(0.9, 0.2, 0.4));
@@ -235,9 +235,11 @@ fn times_are_known_to_tolerances_of_a_few_rounding_errors() {
         let motion = linear((-from).to_array(), random.in_cube().to_array());
         let case = Case::new(ball.clone(), start, motion, tetra.clone(), Pose::IDENTITY, Motion::Rest);
         let options = |tolerance| TimeOfImpactOptions { tolerance: Length::Absolute(tolerance), ..EXACT };
-        let rough = case.impact(&options(1e-7)).time;
-        let fine = case.impact(&options(1e-12)).time;
-        assert!(rough <= fine && fine - rough < 1e-6, "{rough} {fine}");
+        let (rough, fine) = (case.impact(&options(1e-7)), case.impact(&options(1e-12)));
+        assert!(rough.time <= fine.time && fine.time - rough.time < 1e-6, "{rough:?} {fine:?}");
+        // Also where it is that of two edges, which nearly touch.
+        let [rough, fine] = [rough, fine].map(|impact| impact.clearance.normal);
+        assert!(rough.distance(fine) < 2e-6, "{rough} {fine}");
     }
 }
 

@@ -2,6 +2,8 @@
 //! over pairs of parts of them.
 use std::ops::ControlFlow;
 
+use glam::DVec3;
+
 use crate::collide::search::queue::Queue;
 use crate::collide::time_of_impact::moving::{MovingBody, MovingPart};
 use crate::collide::time_of_impact::parting::PairAt;
@@ -18,8 +20,9 @@ pub struct FirstTouch {
 /// The outcome of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// Two faces are within the distance that counts as touching at this time, and none before.
-    Touch(f64),
+    /// Two faces are within the distance that counts as touching at this time, and none before. With
+    /// the direction from that of the second body to that of the first, if it is known exactly.
+    Touch(f64, Option<DVec3>),
     /// No faces are, up to the end.
     Free,
     /// No faces are before this time. What comes then is not known.
@@ -75,7 +78,7 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
         let found = pair.parting(&places, limits.kept, limits.end - time);
         let are_faces = parts.iter().all(MovingPart::is_face);
         if are_faces && found.distance <= limits.touching {
-            return end(Outcome::Touch(time));
+            return end(Outcome::Touch(time, pair.direction(&places)));
         }
         let next = time + found.free;
         if next >= limits.end {

@@ -4,6 +4,7 @@ mod first_touch;
 mod moving;
 mod parting;
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::base::Length;
@@ -211,11 +212,18 @@ pub fn time_of_impact(
         steps: options.iterations,
     };
     let FirstTouch { outcome, steps: iterations } = first_touch(&bodies, &limits);
-    let (Outcome::Touch(time) | Outcome::Unknown(time)) = outcome else {
-        return Ok(TimeOfImpact::Free { end: options.end, iterations });
+    let (time, direction) = match outcome {
+        Outcome::Touch(time, direction) => (time, direction),
+        Outcome::Unknown(time) => (time, None),
+        Outcome::Free => return Ok(TimeOfImpact::Free { end: options.end, iterations }),
     };
     let at = Pair { a: at_time(start.a, motion_a, time), b: at_time(start.b, motion_b, time) };
-    let clearance = at.apart(exactness)?;
+    let mut clearance = at.apart(exactness)?;
+    // On its surface, the gradient of a field is the normal of a face. Between two edges it is not.
+    let gap = |n: DVec3| n.dot(clearance.point_a - clearance.point_b);
+    if let Some(n) = direction.filter(|&n| gap(n) > gap(clearance.normal)) {
+        clearance.normal = n;
+    }
     Ok(if clearance.distance <= tolerance {
         TimeOfImpact::Impact(Impact { time, clearance, iterations })
     } else {

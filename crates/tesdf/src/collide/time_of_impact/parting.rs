@@ -1,5 +1,7 @@
 //! How long two parts of moving surfaces certainly stay apart, by a plane between them. Proof:
 //! `docs/math.md`, section 17.
+use std::iter::once;
+
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
@@ -80,6 +82,19 @@ impl PairAt<'_> {
         }
         found.way = bound.speed * found.free;
         found
+    }
+
+    /// The direction along which the gap of two faces is greatest, from the second to the first. It
+    /// is exact where they nearly touch. `None` of other parts, rounded ones and a plane.
+    pub fn direction(&self, parts: &[PartAt; 2]) -> Option<DVec3> {
+        if self.radius > 0.0 || self.bodies[1].plane_normal().is_some() {
+            return None;
+        }
+        let (_, n) = least_distance(parts)?;
+        let axes = parts[0].axes().chain(parts[1].axes());
+        let axes = axes.map(|axis| if axis.dot(n) < 0.0 { -axis } else { axis });
+        let gap = |n: &DVec3| self.gap(parts, *n).after(0.0);
+        once(n).chain(axes).chain(across_edges(parts, n)).max_by(|m, n| gap(m).total_cmp(&gap(n)))
     }
 
     /// The gap of two parts along `n`, which is about from the second to the first.
