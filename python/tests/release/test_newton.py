@@ -7,6 +7,7 @@ import pytest
 import tesdf
 import tesdf.newton
 import warp as wp
+from conftest import python_blocks
 from unoptimised_kernels import unoptimised
 
 unoptimised()
@@ -96,35 +97,27 @@ def test_the_pipeline_gets_the_contacts_of_the_scene(screw, monkeypatch):
 
 
 def test_the_nuts_turn_down_their_bolts(screw):
+    """Runs the code of docs/integrations.md."""
+    [code] = python_blocks("docs/integrations.md", "Newton")
+    once, step = code.split("\n\npipeline.collide", 1)
     model = model_of(screw, 2)
-    solver = newton.solvers.SolverMuJoCo(
-        model,
-        use_mujoco_contacts=False,
-        use_speculative_contacts=True,
-        integrator="implicitfast",
-        cone="elliptic",
-        njmax=6000,
-        nconmax=6000,
-    )
-    pipeline = pipeline_of(model)
-    pipeline.narrow_phase = tesdf.newton.NarrowPhase(pipeline, screw)
-    contacts, control = pipeline.contacts(), model.control()
     before, after = model.state(), model.state()
+    names = {"model": model, "control": model.control(), "h": STEP, **screw}
+    exec(once, names)
     inertia, mass = model.body_inertia.numpy()[0][2, 2], model.body_mass.numpy()[0]
     # Travel of an ideal screw of 2 mm pitch.
     ideal = 9.81 / (1 + inertia / mass * (2 * np.pi / 2e-3) ** 2) * 0.2**2 / 2
     turned = np.zeros(2)
     for _ in range(100):
         before.clear_forces()
-        pipeline.collide(before, contacts, dt=STEP)
-        solver.step(before, after, control, contacts, STEP)
+        exec("pipeline.collide" + step, {**names, "state": before, "next_state": after})
         before, after = after, before
         turned -= before.body_qd.numpy()[:, 5] * STEP / (2 * np.pi)
     travel = 0.036 - before.body_q.numpy()[:, 2]
     assert (0.9 < travel / ideal).all() and (travel / ideal < 1.4).all()
     # Up to the play of the thread.
     assert (turned > 0.08).all() and (np.abs(travel - turned * 2e-3) < 1.2e-4).all(), (travel, turned)
-    assert pipeline.narrow_phase.scene.clearance(2, 3).distance > -1e-6
+    assert names["pipeline"].narrow_phase.scene.clearance(2, 3).distance > -1e-6
 
 
 def test_what_does_not_fit_is_an_error(screw):
