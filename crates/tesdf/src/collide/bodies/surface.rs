@@ -263,8 +263,8 @@ impl<'a> SurfaceBody<'a> {
     }
 
     /// Whether one of the other faces that share all of these corners of a face is accepted. Faces
-    /// of a mesh are left out to which a direction `across` is perpendicular, up to an angle whose
-    /// sine is `level`.
+    /// are left out to which a direction `across` is perpendicular, up to an angle whose sine is
+    /// `level`.
     pub fn any_beside(
         &self,
         face: u32,
@@ -274,23 +274,25 @@ impl<'a> SurfaceBody<'a> {
     ) -> bool {
         let mut accept =
             |other: u32| other != face && self.face_triangle(other).is_some_and(|triangle| accept(&triangle));
+        let across = (self.linear.transpose() * across).normalize_or_zero();
+        // Most neighbours are, and `f32` is enough to tell.
+        let cosine = (1.0 - level * level).sqrt() + 1e-5;
+        let is_across = |normal: DVec3| across.dot(normal).abs() > cosine;
         match self.shape {
             Shape::Mesh(asset) => {
                 let own = asset.faces[face as usize];
                 let shares = |other: &[u32; 3]| corners.iter().all(|&k| other.contains(&own[k]));
-                let across = (self.linear.transpose() * across).normalize_or_zero();
-                // Most neighbours are, and `f32` is enough to tell.
-                let cosine = (1.0 - level * level).sqrt() + 1e-5;
-                let is_level = |other: u32| {
-                    let normal = asset.records[other as usize].triangle().normal;
-                    across.dot(normal).abs() > cosine
-                };
+                let is_level = |other: u32| is_across(asset.records[other as usize].triangle().normal);
                 let around = corners.first().map_or(&[][..], |&k| asset.faces_at(own[k])).iter();
                 around
                     .copied()
                     .any(|other| shares(&asset.faces[other as usize]) && !is_level(other) && accept(other))
             }
-            simple => Simple::from(simple).any_with(face, corners, accept),
+            simple => {
+                let simple = Simple::from(simple);
+                let is_level = |other: u32| simple.normal(other).is_some_and(is_across);
+                simple.parts_with(face, corners).any(|other| !is_level(other) && accept(other))
+            }
         }
     }
 

@@ -50,6 +50,7 @@ pub struct Clearance {
     /// The witness point on *b*. Its distance from `point_a` is `|distance|`.
     pub point_b: DVec3,
     /// Unit vector from *b* to *a*. When *a* moves along it, the clearance of the witnesses grows.
+    /// Nearer than 1e-9 of its diagonal, it is the normal of the feature of `field` that is nearest.
     pub normal: DVec3,
     /// The face of *a* that contains `point_a`.
     pub face_a: u32,

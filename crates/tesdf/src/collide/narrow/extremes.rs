@@ -55,6 +55,10 @@ pub const LEVEL: f64 = 0.1;
 /// Number of candidates along one direction after which the search for its extreme ends.
 pub const TRIALS: usize = 16;
 
+/// A face that opposes the part is over it within this multiple of its height: the tangent of the
+/// angle between them, which is below 60° ([`OPPOSES`]), with a margin.
+const BESIDE: f64 = 4.0;
+
 /// Rounding of a height, in the local frame.
 const HEIGHT: f64 = 1e-12;
 
@@ -385,6 +389,16 @@ impl<'a> Patch<'a> {
         self.sides.iter().all(|side| side.inward.dot(p - side.start) >= side.least)
     }
 
+    /// Whether a face of the other body lies beside the part, by more than the patch can be high.
+    fn is_beside(&self, points: &[DVec3]) -> bool {
+        let high = BESIDE * (self.limit.abs() + self.minimum.value.distance.abs());
+        let is_beyond = |side: &Side, p: &DVec3| {
+            let height = side.inward.dot(*p - side.start);
+            height < 0.0 && height * height > high * high * side.inward.length_squared()
+        };
+        points.len() == 3 && self.sides.iter().any(|side| points.iter().all(|p| is_beyond(side, p)))
+    }
+
     /// Finds the corners of the overlay of the part and the faces of the other body near it.
     fn find(&self, candidates: &mut Vec<Candidate>) {
         let corner = |point: DVec3| self.part.points().iter().position(|p| *p == point).map(|k| k as u8);
@@ -410,7 +424,7 @@ impl<'a> Patch<'a> {
                         candidates.push(Candidate { point, corner: None, taken });
                     }
                 };
-                for points in simple.parts_against(self.facing) {
+                for points in simple.parts_against(self.facing).filter(|points| !self.is_beside(points)) {
                     match points[..] {
                         [a, b, c] => self.overlay(&Triangle::new([a, b, c]), f64::INFINITY, &mut offer),
                         // The feet of the ends of a capsule's core.

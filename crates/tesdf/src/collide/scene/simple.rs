@@ -1,6 +1,6 @@
 //! Planes, boxes, spheres, capsules and cylinders: their fields as formulas, and the parts of their surfaces.
 use arrayvec::ArrayVec;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::collide::scene::cylinder::{Cylinder, FACES_PER_SECTOR, SECTORS};
 use crate::collide::scene::field_value::FieldValue;
@@ -125,34 +125,56 @@ impl Simple {
         (0..self.part_count()).map(move |part| simple.part(part))
     }
 
-    /// Whether one of the parts that have these corners of a part is accepted; `part` itself may be,
-    /// too.
-    pub fn any_with(&self, part: u32, corners: &[usize], mut accept: impl FnMut(u32) -> bool) -> bool {
-        let own = self.part(part);
-        let accept = |other: u32| {
-            let points = self.part(other);
-            corners.iter().all(|&k| points.contains(&own[k])) && accept(other)
-        };
-        match self {
-            Self::Cylinder(_) => Cylinder::faces_with(part, corners).into_iter().any(accept),
-            _ => (0..self.part_count()).any(accept),
+    /// The outward normal of a part, up to rounding; `None` of a plane and of rounded shapes.
+    pub fn normal(&self, part: u32) -> Option<DVec3> {
+        match *self {
+            Self::Plane | Self::Round { .. } => None,
+            Self::Box(_) => {
+                let outward = if part / 2 % 2 == 0 { -1.0 } else { 1.0 };
+                Some(outward * DVec3::AXES[part as usize / 4 % 3])
+            }
+            Self::Cylinder(_) => Some(Cylinder::normal(part)),
         }
     }
 
-    /// The parts, with an edge of the prism of a cylinder on the side against `normal`: what is
-    /// lowest over a plane with this normal is then on them.
+    /// The parts that have these corners of a part, and the part itself.
+    pub fn parts_with(&self, part: u32, corners: &[usize]) -> impl Iterator<Item = u32> {
+        let own: ArrayVec<u32, 3> = corners.iter().map(|&k| self.corner_numbers(part)[k]).collect();
+        let (around, all) = match self {
+            Self::Cylinder(_) => (Cylinder::faces_around(part, corners), 0..0),
+            _ => (ArrayVec::new(), 0..self.part_count()),
+        };
+        let simple = *self;
+        let has_them = move |other: &u32| {
+            let numbers = simple.corner_numbers(*other);
+            own.iter().all(|corner| numbers.contains(corner))
+        };
+        around.into_iter().chain(all).filter(has_them)
+    }
+
+    /// The corners of a part by their numbers: equal corners have equal numbers.
+    fn corner_numbers(&self, part: u32) -> [u32; 3] {
+        match self {
+            Self::Plane | Self::Round { .. } => [0, 1, 2],
+            Self::Box(_) => TRIANGLES[part as usize % TRIANGLES.len()].map(|corner| corner as u32),
+            Self::Cylinder(_) => Cylinder::nodes_of_face(part),
+        }
+    }
+
+    /// The parts that look against `normal`, with an edge of the prism of a cylinder on that side: what
+    /// is lowest over a plane with this normal is then on them.
     pub fn parts_against(&self, normal: DVec3) -> impl Iterator<Item = Points> {
+        let simple = *self;
         let down = -normal.truncate();
         let turn = match self {
-            Self::Cylinder(_) => down.try_normalize(),
-            _ => None,
+            Self::Cylinder(_) if down.length() > ACROSS => down.normalize(),
+            _ => DVec2::X,
         };
-        self.parts().map(move |mut points| {
-            if let Some(turn) = turn {
-                points.iter_mut().for_each(|p| *p = turn.rotate(p.truncate()).extend(p.z));
-            }
-            points
-        })
+        let turned = move |p: DVec3| turn.rotate(p.truncate()).extend(p.z);
+        let looks_against =
+            move |part: &u32| simple.normal(*part).is_none_or(|own| turned(own).dot(normal) < -ACROSS);
+        let part = move |part| simple.part(part).into_iter().map(turned).collect();
+        (0..self.part_count()).filter(looks_against).map(part)
     }
 
     /// The surface lies within this distance of the parts.
@@ -198,6 +220,9 @@ impl Simple {
         (0..self.node_count()).map(move |node| (simple.node(node), simple.part_of_node(node)))
     }
 }
+
+/// Parts whose normals have a smaller cosine are perpendicular to each other, up to rounding.
+const ACROSS: f64 = 1e-9;
 
 /// The points of a part.
 pub type Points = ArrayVec<DVec3, 3>;
@@ -322,6 +347,26 @@ mod tests {
         assert!((sphere.value(p).distance - (9.25f64.sqrt() - 2.0)).abs() < 1e-15);
         assert_eq!(sphere.value(DVec3::ZERO).distance, -2.0);
         assert_eq!(capsule.nodes().count(), 2);
+    }
+
+    #[test]
+    fn normals_and_neighbours_are_those_of_the_points() {
+        let cylinder = Cylinder { half_height: 2.0, radius: 0.5 };
+        for simple in [Simple::Box(DVec3::new(1.0, 2.0, 3.0)), Simple::Cylinder(cylinder)] {
+            for part in 0..simple.part_count() {
+                let own = simple.part(part);
+                let normal = simple.normal(part).expect("a side");
+                assert!(normal.distance(Triangle::new([own[0], own[1], own[2]]).normal) < 1e-12);
+                for corners in [&[0][..], &[1], &[2], &[0, 1], &[1, 2], &[2, 0]] {
+                    let has_them =
+                        |other: &u32| corners.iter().all(|&k| simple.part(*other).contains(&own[k]));
+                    let mut found: Vec<u32> = simple.parts_with(part, corners).collect();
+                    found.sort_unstable();
+                    let expected: Vec<u32> = (0..simple.part_count()).filter(has_them).collect();
+                    assert_eq!(found, expected, "{part} {corners:?}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -66,7 +66,8 @@ pub struct Impact {
     /// Time of the impact. Before it the bodies are apart.
     pub time: f64,
     /// Witness points, normal and distance at that time. The distance is within the tolerance. It
-    /// is negative only at time 0, for bodies that penetrate from the start.
+    /// is negative only at time 0, for bodies that penetrate from the start. The normal is exact also
+    /// where two edges nearly touch.
     pub clearance: Clearance,
     /// The most steps that a pair of parts took.
     pub iterations: u32,
