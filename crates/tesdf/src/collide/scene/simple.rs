@@ -130,7 +130,7 @@ impl Simple {
         match *self {
             Self::Plane | Self::Round { .. } => None,
             Self::Box(_) => {
-                let outward = if part / 2 % 2 == 0 { -1.0 } else { 1.0 };
+                let outward = if (part / 2).is_multiple_of(2) { -1.0 } else { 1.0 };
                 Some(outward * DVec3::AXES[part as usize / 4 % 3])
             }
             Self::Cylinder(_) => Some(Cylinder::normal(part)),
