@@ -101,12 +101,13 @@ impl<'a> Cones<'a> {
     ///
     /// *A plane*: its height is linear over each face of the other body, so it is lowest at
     /// vertices, which are contacts of their faces. Other contacts of the plane lie between them,
-    /// or inside the body and less deep. *A ball* has one nearest point on a convex body, which its
+    /// or inside the body and less deep. The faces of a cylinder are those of a prism, one of whose
+    /// edges is lowest. *A ball* has one nearest point on a convex body, which its
     /// centre finds.
     pub fn are_of_other_order(&self, per: ContactsPer) -> bool {
         let is_all = match (self.a.shape, self.b.shape) {
             (Shape::Plane, Shape::Mesh(mesh)) => mesh.faces_enclose_the_solid() && mesh.half_thickness == 0.0,
-            (Shape::Plane, Shape::Box { .. } | Shape::Sphere { .. } | Shape::Capsule { .. }) => true,
+            (Shape::Plane, other) => !matches!(other, Shape::Plane),
             (Shape::Box { .. } | Shape::Cylinder { .. }, Shape::Sphere { .. }) => true,
             _ => false,
         };
