@@ -1,7 +1,8 @@
 //! Ctrl-C, and the signals by which a system ends a process.
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, TryLockError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::terminal::report::{self, Failure};
 
@@ -11,6 +12,8 @@ const GRACE: Duration = Duration::from_secs(1);
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// Whether the command looks at the flag.
 static IS_WATCHED: AtomicBool = AtomicBool::new(false);
+/// Held by [`undisturbed`] work, and from the end on.
+static UNDISTURBED: Mutex<()> = Mutex::new(());
 
 /// Lets Ctrl-C, SIGTERM and SIGHUP end the command with exit code 2: at once where it does not look
 /// at the [`flag`], and otherwise when it sees the flag, but within a second. The second signal
@@ -50,9 +53,25 @@ pub fn flag() -> &'static AtomicBool {
     &INTERRUPTED
 }
 
+/// Does what leaves a file behind if the process ends in the midst of it: the end waits for it, but
+/// at most a second.
+pub fn undisturbed<T>(work: impl FnOnce() -> T) -> T {
+    let _held = UNDISTURBED.lock();
+    work()
+}
+
 /// Ends the process. Files are written under a temporary name and then renamed, so no incomplete
 /// file has its final name. The journal of a run is readable up to its last complete step.
 fn end() {
+    let start = Instant::now();
+    let _held = loop {
+        match UNDISTURBED.try_lock() {
+            Err(TryLockError::WouldBlock) if start.elapsed() < GRACE => {
+                thread::sleep(Duration::from_millis(1));
+            }
+            held => break held,
+        }
+    };
     report::error(&Failure::new("interrupted; no output is half written, and a run holds its steps so far"));
     std::process::exit(2);
 }

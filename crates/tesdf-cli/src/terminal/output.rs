@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use tesdf::save::{Destination, ReadOnly, SaveError, SaveOptions};
 
+use crate::terminal::interrupt;
 use crate::terminal::report::{self, Failure};
 
 /// The option of every command that writes a file.
@@ -27,7 +28,8 @@ impl Consent {
 pub fn open(path: &Path, inputs: &[PathBuf], consent: Consent) -> Result<Destination, Failure> {
     let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
     let options = SaveOptions { inputs: &inputs, read_only: consent.read_only() };
-    let destination = Destination::new(path, &options).map_err(failure)?;
+    // It creates a file and removes it.
+    let destination = interrupt::undisturbed(|| Destination::new(path, &options)).map_err(failure)?;
     if destination.is_stdout() {
         report::leave_stdout_to_the_output();
     }
