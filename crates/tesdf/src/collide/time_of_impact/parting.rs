@@ -64,7 +64,7 @@ impl PairAt<'_> {
         } else {
             let between = parts[0].center - parts[1].center;
             for n in parts[0].axes().chain(parts[1].axes()) {
-                offer(if n.dot(between) < 0.0 { -n } else { n });
+                offer(towards(between, n));
             }
             match least_distance(parts) {
                 Some((distance, n)) => {
@@ -92,7 +92,7 @@ impl PairAt<'_> {
         }
         let (_, n) = least_distance(parts)?;
         let axes = parts[0].axes().chain(parts[1].axes());
-        let axes = axes.map(|axis| if axis.dot(n) < 0.0 { -axis } else { axis });
+        let axes = axes.map(|axis| towards(n, axis));
         let gap = |n: &DVec3| self.gap(parts, *n).after(0.0);
         once(n).chain(axes).chain(across_edges(parts, n)).max_by(|m, n| gap(m).total_cmp(&gap(n)))
     }
@@ -187,11 +187,15 @@ fn across_edges(parts: &[PartAt; 2], n: DVec3) -> impl Iterator<Item = DVec3> {
     let to_edge = edges.into_iter().flatten().map(move |edge| n.reject_from_normalized(edge));
     let between = a.into_iter().flat_map(move |a| b.clone().into_iter().map(move |b| a.cross(b)));
     let near = move |m: DVec3| {
-        let m = m.try_normalize()?;
-        let m = if m.dot(n) < 0.0 { -m } else { m };
+        let m = towards(n, m.try_normalize()?);
         (m.dot(n) > NEAR).then_some(m)
     };
     to_edge.chain(between).filter_map(near)
+}
+
+/// `m` or `-m`, whichever does not look against `n`.
+fn towards(n: DVec3, m: DVec3) -> DVec3 {
+    if m.dot(n) < 0.0 { -m } else { m }
 }
 
 /// Cosine of the angle by which a rough direction may be off.
