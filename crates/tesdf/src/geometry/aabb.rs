@@ -87,6 +87,13 @@ mod tests {
     }
 
     #[test]
+    fn gaps_are_those_of_the_intervals() {
+        let b = Aabb::of(&[DVec3::new(5.0, 6.0, 7.0), DVec3::new(6.0, 8.0, 10.0)]);
+        let other = Aabb::of(&[DVec3::new(8.0, 7.5, 2.0), DVec3::new(9.0, 9.0, 3.0)]);
+        assert_eq!((b.gap(other), other.gap(b)), (DVec3::new(2.0, 0.0, 4.0), DVec3::new(2.0, 0.0, 4.0)));
+    }
+
+    #[test]
     fn boxes_contain_and_overlap_on_their_sides() {
         let b = Aabb::of(&[DVec3::ZERO, DVec3::ONE]);
         for axis in 0..3 {

@@ -272,6 +272,90 @@ mod tests {
         assert_eq!(tree.nearest(DVec3::ZERO, |_| 3.0), Some((3.0, 0)));
     }
 
+    /// The items of a subtree.
+    fn below(tree: &AabbTree, child: Child) -> Vec<u32> {
+        match child {
+            Child::Node(n) => {
+                tree.nodes()[n as usize].iter().flat_map(|(_, child)| below(tree, *child)).collect()
+            }
+            Child::Leaf { start, end } => tree.order()[start as usize..end as usize].to_vec(),
+        }
+    }
+
+    /// All splits between the bins of each axis, from the boxes of both sides.
+    #[test]
+    fn the_first_split_is_the_cheapest_one() {
+        for seed in 0..40 {
+            let random = points(120 + 3 * seed);
+            let corners = &random[2 * seed..];
+            let size = |k: usize| DVec3::new(0.3, 0.1, 0.05) * random[(7 * k + seed) % random.len()];
+            let boxes: Vec<Aabb> =
+                corners.iter().enumerate().map(|(k, &p)| Aabb::of(&[p + 2.0, p + 2.0 + size(k)])).collect();
+            let spread = boxes.iter().fold(Aabb::EMPTY, |b, own| b.union(Aabb::of(&[own.center()])));
+            let mut best = (f64::INFINITY, Vec::new());
+            for axis in 0..3 {
+                for bin in 1..BINS {
+                    let share = bin as f64 / BINS as f64;
+                    let at = spread.min[axis] + share * spread.extent()[axis];
+                    let (left, right): (Vec<u32>, Vec<u32>) =
+                        (0..boxes.len() as u32).partition(|&i| boxes[i as usize].center()[axis] < at);
+                    let cost = |side: &[u32]| {
+                        let [x, y, z] = side
+                            .iter()
+                            .fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]))
+                            .extent()
+                            .to_array();
+                        side.len() as f64 * (x * y + y * z + z * x)
+                    };
+                    if !left.is_empty() && !right.is_empty() && cost(&left) + cost(&right) < best.0 {
+                        best = (cost(&left) + cost(&right), left);
+                    }
+                }
+            }
+            let tree = AabbTree::build(&boxes, 1);
+            let mut left = below(&tree, tree.nodes()[0][0].1);
+            left.sort_unstable();
+            assert_eq!(left, best.1, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn deep_nodes_are_halved_along_their_longest_axis() {
+        for lengths in
+            [[4, 2, 1], [4, 1, 2], [2, 4, 1], [1, 4, 2], [2, 1, 4], [1, 2, 4], [4, 4, 1], [1, 4, 4]]
+        {
+            let places: Vec<DVec3> =
+                points(64).iter().map(|p| *p * DVec3::from(lengths.map(f64::from))).collect();
+            let boxes: Vec<Aabb> = places.iter().map(|&p| Aabb::of(&[p])).collect();
+            let (mut items, mut expected): (Vec<u32>, Vec<u32>) = ((0..64).collect(), (0..64).collect());
+            let extent = Aabb::of(&places).extent();
+            let axis = extent.max_position();
+            expected.sort_by(|&a, &b| places[a as usize][axis].total_cmp(&places[b as usize][axis]));
+            assert_eq!((split(&boxes, &mut items, MEDIAN_DEPTH), items), (32, expected), "{lengths:?}");
+        }
+    }
+
+    /// The nearer side is looked at first: few distances are asked for.
+    #[test]
+    fn the_nearest_item_is_found_at_once() {
+        let items: Vec<DVec3> = (0..1024).map(|k| DVec3::X * f64::from(k)).collect();
+        let boxes: Vec<Aabb> = items.iter().map(|&p| Aabb::of(&[p])).collect();
+        let tree = AabbTree::build(&boxes, 1);
+        for k in 0..1023u32 {
+            let (q, mut asked) = (items[k as usize] + 0.25 * DVec3::X, 0);
+            let nearest = tree.nearest(q, |i| {
+                asked += 1;
+                items[i as usize].distance_squared(q)
+            });
+            assert_eq!(nearest, Some((0.0625, k)));
+            assert!(asked <= 2, "{asked} of item {k}");
+        }
+        // On ties the lowest item, from whichever side it is looked at first.
+        for q in [-2.0, 2000.0] {
+            assert_eq!(tree.nearest(DVec3::X * q, |_| 5e6), Some((5e6, 0)));
+        }
+    }
+
     #[test]
     fn a_tree_may_be_empty() {
         let tree = AabbTree::build(&[], 4);
@@ -312,7 +396,7 @@ mod tests {
     /// of them on one side. And points so far apart that their distance is not a number.
     #[test]
     fn points_of_all_sizes_do_not_make_a_deep_tree() {
-        let along = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 0.5)];
+        let along = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 0.5)];
         for way in along {
             let items: Vec<DVec3> = (0..900).map(|k| way * 2f64.powi(-k)).collect();
             let boxes: Vec<Aabb> = items.iter().map(|&p| Aabb::of(&[p])).collect();
