@@ -320,6 +320,13 @@ mod tests {
     }
 
     #[test]
+    fn of_splits_that_cost_the_same_the_first_is_taken() {
+        let boxes = [0.0, 1.0, 2.0].map(|x| Aabb::of(&[DVec3::X * x, DVec3::X * x + 0.25]));
+        let tree = AabbTree::build(&boxes, 1);
+        assert_eq!((below(&tree, tree.nodes()[0][0].1), tree.order()), (vec![0], &[0, 1, 2][..]));
+    }
+
+    #[test]
     fn deep_nodes_are_halved_along_their_longest_axis() {
         for lengths in
             [[4, 2, 1], [4, 1, 2], [2, 4, 1], [1, 4, 2], [2, 1, 4], [1, 2, 4], [4, 4, 1], [1, 4, 4]]
@@ -403,6 +410,7 @@ mod tests {
             let tree = AabbTree::build(&boxes, 1);
             let found = depth(&tree, tree.root(), &boxes);
             assert!((MEDIAN_DEPTH..=MEDIAN_DEPTH + 10).contains(&found), "{way}: {found}");
+            assert!((found..2 * found).contains(&AabbTree::MAX_DEPTH), "{way}: {found}");
             for k in [0, 1, 100, 400, 899] {
                 let near = |i: u32| (items[i as usize] - items[k]).abs().max_element();
                 assert_eq!(

@@ -93,5 +93,6 @@ mod tests {
         assert_eq!(numbers(&beside, 1e-3), [0, 1, 3, 4]);
         // Two points stay of a flat cloud.
         assert_eq!(numbers(&[[0.0, 0.0], [1.0, 1e-6], [2.0, -1e-6], [3.0, 0.0]], 1e-3), [0, 3]);
+        assert_eq!(numbers(&square, 1.0).len(), 2, "at the highest level");
     }
 }

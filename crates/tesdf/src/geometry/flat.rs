@@ -27,8 +27,10 @@ mod tests {
     fn faces_without_height_are_flat() {
         assert!(!is_flat(1.0, 1.0, 0.5));
         assert!(is_flat(0.5, 1.0, 0.5), "as high as the least height");
+        assert!(is_flat(0.5, 2.0, 0.4) && !is_flat(1.0, 2.0, 0.4));
         assert!(is_flat(0.0, 0.0, 1e-6), "a point");
         assert!(is_flat(f64::NAN, 1.0, 0.5));
+        assert!(is_flat(1e-140, POINT, 0.0) && !is_flat(1e-140, POINT.next_up(), 0.0));
         assert!(is_flat(1e-145, 1e-72, 0.0), "its square is 0");
     }
 }

@@ -188,10 +188,13 @@ impl GeneralizedWinding {
             if apart <= radius {
                 return None;
             }
-            let lengths = from.length() * to.length();
-            gradient -= times
-                * along.cross(from)
-                * ((from.length() + to.length()) / (lengths * (lengths + from.dot(to))));
+            let (around, lengths, dot) = (along.cross(from), from.length() * to.length(), from.dot(to));
+            // 1 / (lengths + dot), of which the sum has no digits beside the edge.
+            let over = match dot < 0.0 {
+                true => (lengths - dot) / around.length_squared(),
+                false => 1.0 / (lengths + dot),
+            };
+            gradient -= times * around * ((from.length() + to.length()) / lengths * over);
             // Points of the edge at the way s from the nearest one are at least √(s² + apart²)
             // away.
             let of_edge = (along.length() / apart).min(2.0) / (apart * apart);
@@ -241,7 +244,7 @@ const ROUNDING: f64 = 4e-15;
 /// A cell is on one side only where the number differs from 1/2 by more than this.
 const DECIDED: f64 = 1e-9;
 
-/// The distance of a point from an edge, less its rounding.
+/// The distance of a point from an edge, less the rounding of one that is more than 1e-4 of the coordinates.
 fn apart_from_edge(x: DVec3, [a, b]: [DVec3; 2]) -> f64 {
     let along = b - a;
     let t = ((x - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
@@ -314,6 +317,7 @@ fn connected(edges: &[[u32; 2]]) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{exact, random};
 
     /// The sum of the solid angles of all faces / 4 pi.
     fn by_angles(faces: &[[u32; 3]], vertices: &[DVec3], x: DVec3) -> f64 {
@@ -429,6 +433,7 @@ mod tests {
         let (found, one) =
             (winding.at(DVec3::ONE), GeneralizedWinding::new(&[[0, 1, 2]], |v| vertices[v as usize]));
         assert!((found.value - 1e5 * one.at(DVec3::ONE).value).abs() <= found.error, "{found:?}");
+        assert!(found.error < 1e-8, "{found:?}");
     }
 
     #[test]
@@ -459,6 +464,176 @@ mod tests {
             (winding.side_within(beside, 0.02), winding.side_within(beside, 0.11)),
             (Some(false), None)
         );
+        assert!(winding.is_outside_within(beside, 0.02) && !winding.is_outside_within(beside, 0.11));
         assert_eq!(winding.near(DVec3::new(0.5, -1e-200, 0.0), 0.0), None, "its gradient is infinite");
+    }
+
+    /// That of a wire, 1 / (2 pi times the distance).
+    #[test]
+    fn the_gradient_beside_an_edge_keeps_its_digits() {
+        let vertices = [DVec3::NEG_X, DVec3::X, DVec3::Y];
+        let winding = GeneralizedWinding::new(&[[0, 1, 2]], |v| vertices[v as usize]);
+        for k in 1..=100 {
+            let apart = elementary::powi(0.8, k);
+            for along in [0.0, 0.1, -0.7] {
+                for side in [DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+                    let x = along * DVec3::X + apart * side;
+                    let gradient = winding.near(x, 0.0).unwrap().gradient;
+                    let off = (2.0 * PI * apart * gradient.length() - 1.0).abs();
+                    assert!(off <= 8.0 * apart + 1e-14, "{x}: {off:e}");
+                }
+            }
+        }
+    }
+
+    /// A face that is repeated looks like a large area from far above.
+    #[test]
+    fn far_points_are_outside_where_the_area_is_small() {
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for size in [1e-3, 1.0, 1e3] {
+            let repeated = |n| GeneralizedWinding::new(&vec![[0, 1, 2]; n], |v| size * vertices[v as usize]);
+            let (small, large) = (repeated(1200), repeated(1400));
+            let above = |height: f64| size * DVec3::new(0.3, 0.3, height);
+            // The number is about the area / (4 pi height²), which is 0.48 and 0.56.
+            assert_eq!((small.is_inside(above(10.0)), large.is_inside(above(10.0))), (false, true), "{size}");
+            let least = size * (700.0 / (2.0 * PI)).sqrt();
+            assert!((1.0..1.1).contains(&(large.reach_beyond() / least)), "{size}");
+            // A ball that reaches points inside, at the height of 10.5.
+            let is_outside = |radius: f64| large.is_outside_within(above(15.0), size * radius);
+            assert_eq!([0.5, 1.0, 3.0, 5.0].map(is_outside), [true, true, true, false], "{size}");
+        }
+    }
+
+    /// Beside a long edge the number is an angle, whose second order is half of the bound.
+    #[test]
+    fn the_error_beside_an_edge_is_a_bound_and_not_a_wide_one() {
+        let (faces, vertices) = ([[0, 1, 2]], [DVec3::NEG_X, DVec3::X, DVec3::Y]);
+        let winding = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let (apart, center) = (1e-2, DVec3::new(0.1, -1e-2, 0.0));
+        for (part, wide) in [(0.02, 2.5), (0.5, 14.0), (0.99, f64::INFINITY)] {
+            let near = winding.near(center, part * apart).unwrap();
+            let error = |k: i32| {
+                let (s, c) = (f64::from(k) * PI / 360.0).sin_cos();
+                let way = part * apart * DVec3::new(0.0, c, s);
+                (by_angles(&faces, &vertices, center + way) - near.value - near.gradient.dot(way)).abs()
+            };
+            let ratio = near.error / (0..720).map(error).fold(0.0, f64::max);
+            assert!((1.0..wide).contains(&ratio), "{part}: {ratio}");
+        }
+        for beside in [1e-2, 1e-7].map(|apart| DVec3::new(0.1, -apart, 0.0)) {
+            assert!(winding.near(beside, 0.0).unwrap().error >= winding.at(beside).error, "{beside}");
+        }
+    }
+
+    #[test]
+    fn the_number_depends_on_neither_the_unit_of_length_nor_the_origin() {
+        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let one = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        for (unit, at) in [(2f64.powi(-30), 0.0), (2f64.powi(30), 0.0), (1.0, 8.0)] {
+            let other = GeneralizedWinding::new(&faces, |v| unit * vertices[v as usize] + at);
+            for k in 0..216 {
+                let lattice = DVec3::new(f64::from(k % 6), f64::from(k / 6 % 6), f64::from(k / 36));
+                let (center, radius) = (0.23 * lattice + 0.031, 0.03);
+                let (there, there_radius) = (unit * center + at, unit * radius);
+                assert_eq!(
+                    other.side_within(there, there_radius),
+                    one.side_within(center, radius),
+                    "{there}"
+                );
+                let (near, found) = (one.near(center, radius), other.near(there, there_radius));
+                assert_eq!(near.is_some(), found.is_some(), "{there}");
+                for (near, found) in near.into_iter().zip(found) {
+                    assert!(near.gradient.distance(unit * found.gradient) < 1e-9, "{there}");
+                    assert!((near.value - found.value).abs() < 1e-12, "{there}");
+                    assert!((near.error / found.error - 1.0).abs() < 1e-6, "{there}");
+                }
+            }
+        }
+    }
+
+    /// The bound is that of the best of all closings, or of a good one.
+    #[test]
+    fn the_best_closing_is_taken() {
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
+        let winding = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let corners =
+            winding.cones.iter().flatten().flat_map(|&([a, b, apex], _)| {
+                [apex, 0.5 * (a + apex), 0.4 * a + 0.6 * b, (a + b + apex) / 3.0]
+            });
+        let mut bad = 0;
+        for x in corners.flat_map(|p| [1e-1, 1e-3, 1e-5, 1e-7].map(|d| p + d * DVec3::new(0.3, 0.5, -0.2))) {
+            let alone = |cone: &Vec<_>| {
+                let cones = [(); APEXES].map(|()| cone.clone());
+                GeneralizedWinding { cones, ..winding.clone() }.at(x)
+            };
+            let least = winding.cones.iter().map(|cone| alone(cone).error).fold(f64::INFINITY, f64::min);
+            // Of three triangles with the condition 1/100.
+            let good = ROUNDING * (1.0 + 3.0 * 100.0 + 6.0 * 2.0 * PI);
+            let found = winding.at(x);
+            assert!((ROUNDING..=least.max(good)).contains(&found.error), "{x}: {found:?} {least:e}");
+            assert!((found.value - by_angles(&faces, &vertices, x)).abs() <= 2.0 * found.error, "{x}");
+            bad += usize::from(least > good);
+        }
+        assert!(bad > 10, "{bad}");
+    }
+
+    /// In the opening of a cone the gradient is the bound. In its plane the number is 1/2.
+    #[test]
+    fn the_side_in_an_opening_is_known_up_to_the_plane() {
+        let rim =
+            |k: u32| DVec3::new((f64::from(k) * PI / 12.0).cos(), (f64::from(k) * PI / 12.0).sin(), 0.0);
+        let faces: Vec<[u32; 3]> = (0..24).map(|k| [(k + 1) % 24, k, 24]).collect();
+        let winding = GeneralizedWinding::new(&faces, |v| if v < 24 { rim(v) } else { DVec3::NEG_Z });
+        for (height, inside) in [(-0.1, true), (0.1, false)] {
+            let side = |radius| winding.side_within(DVec3::Z * height, radius);
+            assert_eq!([0.0, 0.08, 0.101].map(side), [Some(inside), Some(inside), None], "{height}");
+        }
+        // In the plane, at a point and beside an edge, where the number rounds badly.
+        let of_corner = GeneralizedWinding::new(&[[0, 2, 1], [0, 1, 3], [2, 0, 3]], |v| {
+            [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z][v as usize]
+        });
+        for (x, step) in [
+            (DVec3::new(0.25, 0.25, 0.5), 1e-5),
+            (DVec3::new(0.5, 0.5 - 1e-7, 1e-7), 1e-8),
+            (DVec3::new(0.3 - 1e-8, 1e-8, 0.7), 1e-9),
+        ] {
+            let side = |height: f64| of_corner.side_within(x + height * DVec3::ONE, 0.0);
+            assert_eq!([-step, 0.0, step].map(side), [Some(true), None, Some(false)], "{x}");
+        }
+    }
+
+    #[test]
+    fn distances_of_edges_are_lower_bounds() {
+        let mut state = 3;
+        let mut point = || DVec3::from_array([0; 3].map(|_| random(&mut state)));
+        for k in 0..600 {
+            let a = point();
+            let b = if k % 50 == 0 { a } else { point() };
+            let x = a + (1.5 * point().x - 0.25) * (b - a) + 10f64.powi(-k % 3) * point();
+            let (found, squared) = (apart_from_edge(x, [a, b]), exact::squared_distance(x, [a, b, b]));
+            assert!(found < 1e-3 || exact::is_between(found, &squared, found * (1.0 + 3e-12)), "{x} {a} {b}");
+        }
+    }
+
+    #[test]
+    fn apexes_move_by_their_shares() {
+        let bounds = Aabb { min: DVec3::ZERO, max: DVec3::splat(8.0) };
+        let (p, share) = (DVec3::new(2.0, 4.0, 5.0), [0.5, -0.25, 0.0]);
+        assert_eq!(moved(p, bounds, share), DVec3::new(5.0, 3.0, 5.0));
+    }
+
+    #[test]
+    fn closed_meshes_have_a_whole_number() {
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let of = |faces: &[[u32; 3]]| GeneralizedWinding::new(faces, |v| vertices[v as usize]);
+        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3], [1, 2, 3]];
+        let closed = of(&faces);
+        assert!(closed.is_closed() && !of(&faces[..3]).is_closed());
+        assert_eq!((closed.angles_per_point(), closed.closing().len()), (0, 0));
+        for (x, inside) in [(DVec3::splat(0.1), true), (DVec3::splat(0.4), false), (DVec3::NEG_X, false)] {
+            assert_eq!((closed.at(x).value, closed.is_inside(x)), (f64::from(inside), inside), "{x}");
+        }
     }
 }

@@ -91,6 +91,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::testing::random;
 
     fn point(c: [i32; 3]) -> DVec3 {
         DVec3::new(c[0].into(), c[1].into(), c[2].into())
@@ -151,7 +152,64 @@ mod tests {
             // On this lattice, triangles that do not meet are farther apart than the error of the
             // iteration.
             prop_assert_eq!(triangles_meet(t, u), distance(t, u) < 5e-3);
-            prop_assert_eq!(triangles_meet(u, t), triangles_meet(t, u));
+            let meet = triangles_meet(t, u);
+            prop_assert_eq!(triangles_meet(u, t), meet);
+            prop_assert!(!(meet && surely_apart(t, u, false)));
+            prop_assert!(flat != 0 || meet || surely_apart(t, u, false), "coplanar and apart");
+            // Where triangles share more than a corner, an edge opposite to it meets the other one.
+            let v = [t[0], u[1], u[2]];
+            prop_assume!(normal_signs(v[0], v[1], v[2]) != [0; 3]);
+            let meet = segment_meets_triangle(t[1], t[2], v) || segment_meets_triangle(v[1], v[2], t);
+            prop_assert!(!(meet && surely_apart(t, v, true)));
+        }
+    }
+
+    #[test]
+    fn segments_within_a_triangle_meet_it() {
+        let t = [[0, 0, 0], [9, 0, 0], [0, 9, 0]].map(point);
+        for t in [t, [t[0], t[2], t[1]]] {
+            assert!(segment_meets_triangle(point([1, 1, 0]), point([2, 3, 0]), t));
+            assert!(triangles_meet([[1, 1, 0], [2, 1, 0], [1, 2, 0]].map(point), t));
+        }
+    }
+
+    /// Triangles of a fan share its centre, and neighbours an edge.
+    #[test]
+    fn triangles_of_a_fan_are_apart_beside_its_centre() {
+        let (x, y, center) = (DVec3::new(0.8, 0.0, 0.6), DVec3::Y, DVec3::new(7.1, -3.3, 0.7));
+        for n in [5, 8, 30] {
+            let rim = |k: usize| {
+                let (s, c) = (k as f64 * std::f64::consts::TAU / n as f64).sin_cos();
+                center + c * x + s * y
+            };
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let [t, u] = [i, j].map(|k| [center, rim(k), rim((k + 1) % n)]);
+                let apart = (2..n - 1).contains(&((n + i - j) % n));
+                assert_eq!(surely_apart(t, u, true), apart, "{n} {i} {j}");
+                assert!(!surely_apart(t, u, false), "they share the centre");
+            }
+        }
+    }
+
+    /// Integers of up to 53 bits: sums of products are exact in 128 bits.
+    #[test]
+    fn least_heights_are_lower_bounds() {
+        let mut state = 1;
+        for k in 0..3000u64 {
+            let mut vector =
+                |bits: i32| [0; 3].map(|_| ((random(&mut state) - 0.5) * 2f64.powi(bits)).round());
+            let (axis, from) = (vector(40), vector(53));
+            // Half of them are nearly perpendicular to the axis.
+            let across = [axis[1], -axis[0], 0.0].map(|x| 512.0 * x);
+            let beside = vector(if k % 2 == 0 { 3 } else { 50 });
+            let p = [0, 1, 2].map(|i| from[i] + across[i] + beside[i]);
+            let found = least_along(axis.into(), &[p.into()], from.into());
+            let whole = |x: f64| x as i128;
+            let products = [0, 1, 2].map(|i| whole(axis[i]) * (whole(p[i]) - whole(from[i])));
+            let (exact, size) =
+                (products.iter().sum::<i128>(), products.iter().map(|x| x.abs()).sum::<i128>());
+            assert!(whole(found.ceil()) <= exact, "{k}: {found} {exact}");
+            assert!(found >= exact as f64 - 20.0 * f64::EPSILON * size as f64, "{k}: {found} {exact}");
         }
     }
 }

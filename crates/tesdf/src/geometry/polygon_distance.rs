@@ -261,4 +261,17 @@ mod tests {
             "a point, and a segment beside an edge"
         );
     }
+
+    #[test]
+    fn polygons_and_triangles_without_area_are_segments_or_points() {
+        let v = DVec3::new;
+        let t = Triangle::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
+        let distance = |points: &[DVec3], normal, t| polygon_to_triangle(points, normal, t, 9.0).unwrap().0;
+        let line = [v(-0.5, -3.0, 4.0), v(1.5, -3.0, 4.0), v(0.5, -3.0, 4.0)];
+        assert_eq!(distance(&line, DVec3::ZERO, &t), 5.0);
+        // In line with an edge, but beyond its end.
+        assert_eq!(distance(&[v(2.0, 0.0, 0.0), v(3.0, 0.0, 0.0)], DVec3::Z, &t), 1.0);
+        let point = Triangle::new([v(0.5, -3.0, 4.0); 3]);
+        assert_eq!(distance(&[DVec3::ZERO, DVec3::X, DVec3::Y], DVec3::Z, &point), 5.0, "beside an edge");
+    }
 }

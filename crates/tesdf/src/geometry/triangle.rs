@@ -289,7 +289,7 @@ fn seen_from_nearer_ends(from: &[DVec3; 3], along: &[DVec3; 3], normal: DVec3) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{degenerate, exact};
+    use crate::testing::{degenerate, exact, random};
     use proptest::prelude::*;
 
     /// Largest accepted error of a distance, for coordinates up to 2. A face that counts as its
@@ -336,6 +336,26 @@ mod tests {
 
     proptest! {
         #[test]
+        fn regions_are_those_of_the_closest_features(a in point(), b in point(), c in point(), p in point()) {
+            let (u, v) = (b - a, c - a);
+            prop_assume!(u.cross(v) != DVec3::ZERO);
+            let to = |corners: [DVec3; 3]| exact::squared_distance(p, corners);
+            let least = to([a, b, c]);
+            // The plane and the lines of the edges, as far as it matters.
+            let plane = [a - 999.0 * (u + v), a + 2999.0 * u - 999.0 * v, a - 999.0 * u + 2999.0 * v];
+            let mut expected = u8::from(to(plane) == least);
+            for (k, [from, end]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
+                let (edge, way) = (to([from, end, end]), 999.0 * (end - from));
+                expected |= u8::from(edge == least && to([from - way, end + way, end]) == edge) << (1 + k);
+                expected |= u8::from(to([from; 3]) == least) << (4 + k);
+            }
+            let found = Triangle::new([a, b, c]).regions(p).0;
+            // Beside the prism over the face, rounding decides.
+            let either = expected & 1 == 1 && found != 0 && found & !expected == 0;
+            prop_assert!(found == expected || either, "{found:b} {expected:b}");
+        }
+
+        #[test]
         fn no_sample_of_the_triangle_is_closer(a in point(), b in point(), c in point(), p in point()) {
             let triangle = Triangle::new([a, b, c]);
             let found = triangle.closest(p);
@@ -350,6 +370,59 @@ mod tests {
             prop_assert!((found.point.distance(p) - found.distance).abs() <= 1e-12);
             prop_assert!(least <= found.distance + 0.1);
             prop_assert!(triangle.regions(p).0 != 0);
+            for (k, [a, b]) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
+                let on_edge = triangle.closest_on_edge(k, p);
+                prop_assert!(exact::is_root(on_edge.distance, &exact::squared_distance(p, [a, b, b]), 1e-14));
+                prop_assert!((on_edge.point.distance(p) - on_edge.distance).abs() <= 1e-14);
+            }
+        }
+    }
+
+    /// Corners are integers of up to 53 bits whose differences round. Their cross product cancels by
+    /// half of its digits, and is exact in 128 bits.
+    #[test]
+    fn cross_products_of_needles_keep_their_digits() {
+        let mut state = 9;
+        for k in 0..3000 {
+            let mut vector = |bits: f64| {
+                [0; 3]
+                    .map(|_| ((random(&mut state) - 0.5) * 2f64.powf(bits)) as i64 + (state >> 40 & 1) as i64)
+            };
+            let (a, beside) = (vector(53.98), [vector(f64::from(k % 40)), vector(f64::from(k / 5 % 45))]);
+            let [b, c] = beside.map(|beside| [0, 1, 2].map(|i| beside[i] - a[i]));
+            let away = |p: [i64; 3]| [0, 1, 2].map(|i| i128::from(p[i]) - i128::from(a[i]));
+            let (u, v) = (away(b), away(c));
+            let [a, b, c] = [a, b, c].map(|p| DVec3::from_array(p.map(|x| x as f64)));
+            let found = cross_of_differences(a, b, c);
+            for (i, j, l) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+                let exact = (u[j] * v[l] - u[l] * v[j]) as f64;
+                let error = (found[i] - exact).abs();
+                assert!(error <= f64::EPSILON * exact.abs() + 64.0, "{a} {b} {c}: {error:e} of {exact:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn narrow_triangles_and_those_of_a_given_normal_are_needles() {
+        for (height, is_needle) in [(1.0, false), (0.2, false), (0.05, true), (0.0, true)] {
+            let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.5, height, 0.0)];
+            let found = Triangle::new(corners);
+            let again = Triangle::from_parts(corners, found.normal, found.is_needle());
+            assert_eq!((found.is_needle(), again.is_needle()), (is_needle, is_needle), "{height}");
+            assert!(Triangle::with_normal(corners, found.normal).is_needle());
+        }
+    }
+
+    #[test]
+    fn sets_of_regions_are_intersected_and_have_a_least_feature() {
+        for bits in 1..128u8 {
+            let has = |k: u8| bits >> k & 1 == 1;
+            let corner = (0..3).find(|&k| has(4 + k)).map(Feature::Vertex);
+            let edge = (0..3).find(|&k| has(1 + k)).map(Feature::Edge);
+            assert_eq!(Regions(bits).least(), corner.or(edge).unwrap_or(Feature::Face), "{bits}");
+            for k in 0..7 {
+                assert_eq!(Regions(bits).and(Regions(1 << k)).0 != 0, has(k), "{bits} {k}");
+            }
         }
     }
 }

@@ -169,6 +169,7 @@ impl Segment {
 mod tests {
     use super::*;
     use crate::geometry::strategy::point;
+    use crate::testing::random;
     use proptest::prelude::*;
 
     /// Two cubes that overlap, one within the other, and one inverted: outward, edge and lowest
@@ -254,8 +255,11 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
         #[test]
-        fn segments_meet_the_boxes_that_clip_them(x in point(), p in point(), flat in 0usize..4, corners in [point(), point()]) {
-            let mut p = p;
+        fn segments_meet_the_boxes_that_clip_them(
+            x in point(), p in point(), flat in 0usize..4, corners in [point(), point()], unit in -200..200
+        ) {
+            let unit = 2f64.powi(unit);
+            let (x, mut p, corners) = (unit * x, unit * p, corners.map(|p| unit * p));
             if flat < 3 {
                 p[flat] = x[flat];
             }
@@ -265,6 +269,27 @@ mod tests {
             prop_assert_eq!(Segment::new(x, p).may_meet(b), length > 0.0, "{}", length);
             let along = DVec3::new(p.x, x.y, x.z);
             prop_assert_eq!(Segment::new(x, along).may_meet(b), clipped(x, along, b) >= 0.0);
+        }
+    }
+
+    /// A corner of the box lies on the segment, at its end or in its middle. Coordinates are integers
+    /// of up to 53 bits times a unit, so that this is exact, but sums and products of them are not.
+    #[test]
+    fn segments_meet_the_boxes_that_they_touch() {
+        let mut state = 5;
+        for k in 0..60_000u32 {
+            let unit = [1.0, 2f64.powi(-52), 2f64.powi(-90)][k as usize % 3];
+            let mut bits = |of: &[[i32; 3]]| {
+                let choice = of[(random(&mut state) * of.len() as f64) as usize];
+                DVec3::from_array(choice.map(|bits| ((random(&mut state) - 0.5) * 2f64.powi(bits)).round()))
+            };
+            let corner = bits(&[[53; 3], [30, 53, 40], [40, 3, 53], [53, 9, 9]]);
+            let way = bits(&[[50; 3], [2, 52, 2], [3, 40, 2], [52, 3, 30], [9, 30, 52], [9; 3]]);
+            let other = bits(&[[50; 3], [1, 1, 52], [2, 52, 2], [52, 2, 2], [2; 3]]);
+            let b = Aabb::of(&[unit * corner, unit * (corner + other)]);
+            for (x, p) in [(corner, corner + way), (corner - way, corner + way), (corner + way, corner)] {
+                assert!(Segment::new(unit * x, unit * p).may_meet(b), "{x} {p} {b:?}");
+            }
         }
     }
 }
