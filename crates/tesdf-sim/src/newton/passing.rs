@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use tesdf::Length;
 use tesdf::base::elementary;
+use tesdf::collide::internal::Ahead;
 use tesdf::collide::{
     ClearanceOptions, InstanceId, InstancePair, Motion, TimeOfImpactOptions, Velocity, clearance,
     instance_pairs, time_of_impact,
@@ -52,7 +53,7 @@ struct Fast {
     bodies: [usize; 2],
     /// The diagonal of the smaller one, m.
     size: f64,
-    /// Bound of the way by which it closes in the part, m.
+    /// Bound of the change of distances in the part, m.
     way: f64,
 }
 
@@ -150,9 +151,12 @@ impl Newton {
         };
         let bend = self.system.bodies().iter().zip(states).map(bend).fold(0.0, f64::max);
         let pairs = instance_pairs(self.system.scene_at(states)?, bend, step.h)?;
-        let of_pair = |InstancePair { first, second, contact_distance: way }| {
+        let of_pair = |InstancePair { first, second, .. }| {
             let bodies = [self.system.body_of(first)?, self.system.body_of(second)?];
             let size = bodies.map(|body| self.sizes[body]).into_iter().fold(f64::INFINITY, f64::min);
+            // Along a plane, too, motion says how far a straight way is from the real one.
+            let [a, b] = Ahead::of_both(self.system.scene(), [first, second], step.h).ok()?;
+            let way = bend + a.change(&b);
             let is_deep = |body: usize| step.free_of[body].is_some_and(|k| step.deep[k]);
             (!bodies.into_iter().any(is_deep)).then_some(Fast { ids: [first, second], bodies, size, way })
         };

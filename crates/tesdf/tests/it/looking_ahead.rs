@@ -145,6 +145,49 @@ fn no_point_of_a_part_comes_closer_than_its_bound_says() {
     assert!(less > 10_000, "only {less} parts look less far than their pair");
 }
 
+/// Over a plane that does not turn, only the height counts.
+#[test]
+fn no_point_comes_lower_over_a_plane_than_its_bound_says() {
+    let mut random = Random(24);
+    let (mut widest, mut less) = ([0.0f64; 2], 0);
+    for case in 0..4000 {
+        let mut scene = Scene::new();
+        let mut a = instance(&mut scene, BOX, &mut random);
+        let mut plane = instance(&mut scene, Shape::Plane, &mut random);
+        (a.velocity, plane.velocity) = (velocity(&mut random), velocity(&mut random));
+        plane.velocity.angular = DVec3::ZERO;
+        let normal = plane.pose.rotation * DVec3::Z;
+        if case % 4 == 0 {
+            a.velocity.angular = 3.0 * random.unit() * normal;
+        }
+        let time = random.power(-2.0, -0.5).abs();
+        let [ahead, of_plane] = [(&a, &BOX), (&plane, &Shape::Plane)].map(|(i, s)| Ahead::new(i, s, time));
+        let (approach, whole) = (ahead.approach(&of_plane), ahead.closing(&of_plane));
+        assert_eq!(whole, of_plane.closing(&ahead));
+        for _ in 0..40 {
+            let p = point(&a, &mut random);
+            let height = |time| normal.dot(moved(&a, p, time) - moved(&plane, DVec3::ZERO, time));
+            let fall = height(0.0) - height(time * random.unit());
+            let radius = if random.index(2) == 0 { 0.0 } else { random.power(-2.0, 0.0).abs() };
+            let center = moved(&a, p, 0.0) + radius * random.unit() * random.direction();
+            let bounds = [whole, approach.around(center, radius)];
+            let rounding = 1e-13 * (20.0 + ahead.motion() + time * plane.velocity.linear.length());
+            for (bound, widest) in bounds.into_iter().zip(&mut widest) {
+                assert!(
+                    fall <= bound + rounding,
+                    "case {case}: {fall} is more than {bound}\n{a:?}\n{plane:?}"
+                );
+                if bound > 1e-6 {
+                    *widest = widest.max(fall / bound);
+                }
+            }
+            less += usize::from(bounds[1] < 0.5 * whole);
+        }
+    }
+    assert!(widest.iter().all(|widest| *widest > 0.95), "a bound is never nearly reached: {widest:?}");
+    assert!(less > 10_000, "only {less} parts look less far than their pair");
+}
+
 /// Where an approach covers another one, no point of the ball needs more than it has looked.
 #[test]
 fn an_approach_covers_what_is_nowhere_greater() {
@@ -155,9 +198,12 @@ fn an_approach_covers_what_is_nowhere_greater() {
             let mut vector = |size: f64| size * random.power(-2.0, 0.0) * random.direction();
             let (way, turn) = (vector(1.0), vector(2.0));
             match like {
-                None => Approach { about: vector(1.0), way, turn, rest: 0.01 * way.length() },
+                None => {
+                    let normal = (case % 2 == 0).then(|| vector(1.0).normalize());
+                    Approach { about: vector(1.0), way, turn, normal, rest: 0.01 * way.length() }
+                }
                 Some(like) => {
-                    let share = [0.0, 0.4, 1.0, 1.1][case % 4];
+                    let share = [0.0, 0.4, 1.0, 1.1][case / 2 % 4];
                     let (way, turn) = (share * like.way + 0.1 * way, share * like.turn + 0.1 * turn);
                     Approach { way, turn, ..like }
                 }

@@ -19,7 +19,8 @@ pub struct OrderedPairs {
     /// [`WORDS`] words for each: instances a and b, shapes of a and b.
     pub words: Box<[u32]>,
     /// [`ROWS`] rows for each: the three rows of the linear map, each with its coordinate of the
-    /// shift; scale, reach and both radii; way and rest of the approach, and its turn.
+    /// shift; scale, reach and both radii; way and rest of the approach, its turn, and whether the
+    /// field is a plane that does not turn.
     pub rows: Box<[Row]>,
     /// Capacity of the list.
     pub room: u32,
@@ -99,7 +100,7 @@ impl OrderedPairs {
     fn approach(&self, pair: OrderedPair) -> Approach {
         let row = (pair.number * ROWS) as usize;
         let (p, q) = (self.rows[row + 4], self.rows[row + 5]);
-        Approach { way: xyz(p), turn: xyz(q), rest: last(p) }
+        Approach { way: xyz(p), turn: xyz(q), rest: last(p), is_over_plane: last(q) }
     }
 
     /// Writes an ordered pair. Its number is its index. The rest of the approach contains the
@@ -116,7 +117,7 @@ impl OrderedPairs {
         self.rows[row + 2] = row_of(pair.z, pair.shift.z);
         self.rows[row + 3] = row_of(v3(pair.scale, pair.reach, pair.radius), pair.own_radius);
         self.rows[row + 4] = row_of(approach.way, approach.rest);
-        self.rows[row + 5] = row_of(approach.turn, 0.0f32);
+        self.rows[row + 5] = row_of(approach.turn, approach.is_over_plane);
     }
 }
 

@@ -2,8 +2,8 @@
 //! face, within a tolerance.
 //!
 //! The threads of a group find the faces of the other body that are nearest to the whole face, by a
-//! walk through the face tree. Where the face crosses the surface or is inside, 32 of its points
-//! give a first depth. Then the face, moved out by this depth and the tolerance, often clears the
+//! walk through the face tree. Where the face crosses the surface or is inside, a grid of its points
+//! gives a first depth. Then the face, moved out by this depth and the tolerance, often clears the
 //! surface, which proves the depth. Otherwise branch and bound finds it.
 use cubecl::prelude::*;
 

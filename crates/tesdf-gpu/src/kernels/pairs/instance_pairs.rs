@@ -91,7 +91,7 @@ impl Instances {
     }
 
     fn ahead(&self, instance: u32) -> Ahead {
-        ahead::ahead(&self.rows, self.row_of_motion(instance), self.pose(instance).origin)
+        ahead::ahead(&self.rows, self.row_of_motion(instance), self.pose(instance))
     }
 
     /// The greatest distance that the velocity can move a point of an instance.
@@ -109,7 +109,12 @@ impl Instances {
     fn approach(&self, a: u32, b: u32) -> Approach {
         let to = self.pose(b);
         let found = self.ahead(a).approach(self.ahead(b), to);
-        Approach { way: found.way, turn: found.turn, rest: found.rest + self.contact_distance / to.unit }
+        Approach {
+            way: found.way,
+            turn: found.turn,
+            rest: found.rest + self.contact_distance / to.unit,
+            is_over_plane: found.is_over_plane,
+        }
     }
 }
 

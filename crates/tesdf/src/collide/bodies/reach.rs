@@ -23,6 +23,7 @@ impl Reach {
             about: field.to_field(approach.about),
             way: turned(approach.way) / unit,
             turn: turned(approach.turn),
+            normal: approach.normal.map(turned),
             rest: (approach.rest + least) / unit,
         };
         Self { most: most / unit, approach }
