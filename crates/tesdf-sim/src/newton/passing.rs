@@ -155,12 +155,16 @@ impl Newton {
             let bodies = [self.system.body_of(first)?, self.system.body_of(second)?];
             let size = bodies.map(|body| self.sizes[body]).into_iter().fold(f64::INFINITY, f64::min);
             // Along a plane, too, motion says how far a straight way is from the real one.
-            let [a, b] = Ahead::of_both(self.system.scene(), [first, second], step.h).ok()?;
+            let [a, b] = match Ahead::of_both(self.system.scene(), [first, second], step.h) {
+                Ok(both) => both,
+                Err(e) => return Some(Err(e.into())),
+            };
             let way = bend + a.change(&b);
             let is_deep = |body: usize| step.free_of[body].is_some_and(|k| step.deep[k]);
-            (!bodies.into_iter().any(is_deep)).then_some(Fast { ids: [first, second], bodies, size, way })
+            let is_any_deep = bodies.into_iter().any(is_deep);
+            (!is_any_deep).then_some(Ok(Fast { ids: [first, second], bodies, size, way }))
         };
-        Ok(pairs.into_iter().filter_map(of_pair).collect())
+        pairs.into_iter().filter_map(of_pair).collect()
     }
 
     /// What a pair does in a part. The scene is at its beginning.

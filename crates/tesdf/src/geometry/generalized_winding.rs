@@ -244,7 +244,8 @@ const ROUNDING: f64 = 4e-15;
 /// A cell is on one side only where the number differs from 1/2 by more than this.
 const DECIDED: f64 = 1e-9;
 
-/// The distance of a point from an edge, less the rounding of one that is more than 1e-4 of the coordinates.
+/// The distance of a point from an edge, less the rounding of one that is more than 1e-4 of the
+/// coordinates.
 fn apart_from_edge(x: DVec3, [a, b]: [DVec3; 2]) -> f64 {
     let along = b - a;
     let t = ((x - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
@@ -319,6 +320,14 @@ mod tests {
     use super::*;
     use crate::testing::{exact, random};
 
+    const POINTS: [DVec3; 4] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    const CORNER: [[u32; 3]; 3] = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
+
+    /// Three of the faces of a tetrahedron, at such places.
+    fn corner(at: impl Fn(DVec3) -> DVec3) -> GeneralizedWinding {
+        GeneralizedWinding::new(&CORNER, |v| at(POINTS[v as usize]))
+    }
+
     /// The sum of the solid angles of all faces / 4 pi.
     fn by_angles(faces: &[[u32; 3]], vertices: &[DVec3], x: DVec3) -> f64 {
         let angle = |f: &[u32; 3]| solid_angle(f.map(|v| vertices[v as usize]), x).0;
@@ -371,9 +380,7 @@ mod tests {
     /// No point of a ball is on another side than the ball.
     #[test]
     fn balls_with_a_side_are_on_it() {
-        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
-        let winding = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let winding = corner(|p| p);
         let (mut decided, mut open) = ([0, 0], 0);
         for k in 0..1000 {
             let lattice = DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100));
@@ -388,7 +395,7 @@ mod tests {
                         let corner = DVec3::new(f64::from(j & 1), f64::from(j >> 1 & 1), f64::from(j >> 2));
                         let p = center + radius * (2.0 * corner - 1.0) / 3f64.sqrt();
                         assert_eq!(winding.is_inside(p), inside, "{center} {radius} {p}");
-                        assert_eq!(by_angles(&faces, &vertices, p).abs() >= 0.5, inside, "{p}");
+                        assert_eq!(by_angles(&CORNER, &POINTS, p).abs() >= 0.5, inside, "{p}");
                     }
                 }
             }
@@ -400,9 +407,7 @@ mod tests {
     /// and the error shrinks with the square of the radius.
     #[test]
     fn the_number_near_a_point_is_linear() {
-        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
-        let winding = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let winding = corner(|p| p);
         let mut known = 0;
         for k in 0..1000 {
             let lattice = DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100));
@@ -413,10 +418,10 @@ mod tests {
             for j in 0..8 {
                 let corner = DVec3::new(f64::from(j & 1), f64::from(j >> 1 & 1), f64::from(j >> 2));
                 let way = radius * (2.0 * corner - 1.0) / 3f64.sqrt();
-                let error = by_angles(&faces, &vertices, center + way) - near.value - near.gradient.dot(way);
+                let error = by_angles(&CORNER, &POINTS, center + way) - near.value - near.gradient.dot(way);
                 assert!(error.abs() <= near.error, "{center}: {error:e} {:e}", near.error);
                 let fine = 1e-3 * way;
-                let moved = by_angles(&faces, &vertices, center + fine) - near.value;
+                let moved = by_angles(&CORNER, &POINTS, center + fine) - near.value;
                 let slope = near.gradient.dot(fine);
                 assert!((moved - slope).abs() <= 1e-6 * near.error + 1e-13, "{center}: {moved:e} {slope:e}");
             }
@@ -527,11 +532,9 @@ mod tests {
 
     #[test]
     fn the_number_depends_on_neither_the_unit_of_length_nor_the_origin() {
-        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
-        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let one = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let one = corner(|p| p);
         for (unit, at) in [(2f64.powi(-30), 0.0), (2f64.powi(30), 0.0), (1.0, 8.0)] {
-            let other = GeneralizedWinding::new(&faces, |v| unit * vertices[v as usize] + at);
+            let other = corner(|p| unit * p + at);
             for k in 0..216 {
                 let lattice = DVec3::new(f64::from(k % 6), f64::from(k / 6 % 6), f64::from(k / 36));
                 let (center, radius) = (0.23 * lattice + 0.031, 0.03);
@@ -555,9 +558,7 @@ mod tests {
     /// The bound is that of the best of all closings, or of a good one.
     #[test]
     fn the_best_closing_is_taken() {
-        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
-        let winding = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let winding = corner(|p| p);
         let corners =
             winding.cones.iter().flatten().flat_map(|&([a, b, apex], _)| {
                 [apex, 0.5 * (a + apex), 0.4 * a + 0.6 * b, (a + b + apex) / 3.0]
@@ -573,7 +574,7 @@ mod tests {
             let good = ROUNDING * (1.0 + 3.0 * 100.0 + 6.0 * 2.0 * PI);
             let found = winding.at(x);
             assert!((ROUNDING..=least.max(good)).contains(&found.error), "{x}: {found:?} {least:e}");
-            assert!((found.value - by_angles(&faces, &vertices, x)).abs() <= 2.0 * found.error, "{x}");
+            assert!((found.value - by_angles(&CORNER, &POINTS, x)).abs() <= 2.0 * found.error, "{x}");
             bad += usize::from(least > good);
         }
         assert!(bad > 10, "{bad}");
@@ -591,9 +592,7 @@ mod tests {
             assert_eq!([0.0, 0.08, 0.101].map(side), [Some(inside), Some(inside), None], "{height}");
         }
         // In the plane, at a point and beside an edge, where the number rounds badly.
-        let of_corner = GeneralizedWinding::new(&[[0, 2, 1], [0, 1, 3], [2, 0, 3]], |v| {
-            [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z][v as usize]
-        });
+        let of_corner = corner(|p| p);
         for (x, step) in [
             (DVec3::new(0.25, 0.25, 0.5), 1e-5),
             (DVec3::new(0.5, 0.5 - 1e-7, 1e-7), 1e-8),
@@ -626,11 +625,9 @@ mod tests {
 
     #[test]
     fn closed_meshes_have_a_whole_number() {
-        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let of = |faces: &[[u32; 3]]| GeneralizedWinding::new(faces, |v| vertices[v as usize]);
-        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3], [1, 2, 3]];
-        let closed = of(&faces);
-        assert!(closed.is_closed() && !of(&faces[..3]).is_closed());
+        let faces = [CORNER[0], CORNER[1], CORNER[2], [1, 2, 3]];
+        let closed = GeneralizedWinding::new(&faces, |v| POINTS[v as usize]);
+        assert!(closed.is_closed() && !corner(|p| p).is_closed());
         assert_eq!((closed.angles_per_point(), closed.closing().len()), (0, 0));
         for (x, inside) in [(DVec3::splat(0.1), true), (DVec3::splat(0.4), false), (DVec3::NEG_X, false)] {
             assert_eq!((closed.at(x).value, closed.is_inside(x)), (f64::from(inside), inside), "{x}");

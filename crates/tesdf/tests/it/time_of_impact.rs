@@ -224,6 +224,38 @@ fn random_motions_are_free_before_the_impact_and_touch_at_it() {
 }
 
 #[test]
+fn cylinders_and_boxes_are_free_before_the_impact_and_touch_at_it() {
+    let mut random = Random(12);
+    let block = boxed(DVec3::new(0.1, 0.2, 0.05));
+    let shapes = [
+        Shape::Cylinder { half_height: 0.01, radius: 0.1 },
+        Shape::Cylinder { half_height: 0.3, radius: 0.02 },
+        Shape::Box { half_extents: DVec3::new(0.1, 0.2, 0.05) },
+        Shape::Capsule { half_height: 0.2, radius: 0.05 },
+        block.into(),
+    ];
+    let options = TimeOfImpactOptions { tolerance: Length::Absolute(2e-7), end: 1.0, iterations: 1000 };
+    let (mut hits, mut most) = (0, 0);
+    for (a, b) in (0..3).flat_map(|i| (i..5).map(move |j| (i, j))).cycle().take(120) {
+        let mut pose = |at: DVec3, size: f64| {
+            let turn = DQuat::from_scaled_axis(3.0 * random.in_cube());
+            // Some are as they are made, so that faces and round sides are parallel.
+            let turn = if random.unit() < 0.3 { DQuat::IDENTITY } else { turn };
+            Pose::new(at + size * random.in_cube(), turn).expect("a pose")
+        };
+        let poses = [pose(0.7 * DVec3::X, 0.1), pose(DVec3::ZERO, 0.1)];
+        let mut spin = || if random.unit() < 0.3 { [0.0; 3] } else { (5.0 * random.in_cube()).to_array() };
+        let motions = [linear([-1.0, 0.0, 0.0], spin()), linear([0.0; 3], spin())];
+        let [first, second] = [a, b].map(|k: usize| shapes[k].clone());
+        let case = Case::new(first, poses[0], motions[0], second, poses[1], motions[1]);
+        let verdict = case.check(&options, 40);
+        hits += usize::from(verdict.impact().is_some());
+        most = most.max(verdict.iterations());
+    }
+    assert!((60..120).contains(&hits) && most < 500, "{hits} of 120, {most}");
+}
+
+#[test]
 fn times_and_normals_are_known_to_tolerances_of_a_few_rounding_errors() {
     let mut random = Random(8);
     let ball = asset(&Surface::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid());

@@ -77,8 +77,8 @@ impl Ahead {
     pub fn approach(&self, other: &Self) -> Approach {
         let (way, turn) = (self.way - other.way, self.turn - other.turn);
         let at_origin = way - other.turn.cross(self.origin - other.origin);
-        let towards = |turn: DVec3| other.normal.map_or(turn, |normal| turn.reject_from_normalized(normal));
-        let bends = other.turn.cross(way).length() + arc(self.turn, self.reach) * towards(turn).length();
+        let tilt = other.normal.map_or(turn, |normal| turn.reject_from_normalized(normal));
+        let bends = other.turn.cross(way).length() + arc(self.turn, self.reach) * tilt.length();
         // A plane that turns has points at which there is no bound.
         let rest = if bends.is_nan() { f64::INFINITY } else { 0.5 * bends };
         Approach { about: self.origin, way: at_origin, turn, normal: other.normal, rest }

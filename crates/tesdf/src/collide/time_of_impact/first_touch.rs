@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use crate::collide::search::queue::Queue;
-use crate::collide::time_of_impact::moving::{MovingBody, MovingPart};
+use crate::collide::time_of_impact::moving::{MovingBody, MovingPart, PartAt};
 use crate::collide::time_of_impact::parting::PairAt;
 
 /// What a search found.
@@ -62,9 +62,7 @@ const SHARE: f64 = 0.25;
 /// goes on to a later time, or is divided. So when two faces touch, everything is free up to then.
 pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
     let mut open = Queue::new();
-    let first = if bodies[1].is_plane() { bodies[0].whole_beside_plane() } else { bodies[0].whole() };
-    let whole = [first, bodies[1].whole()];
-    open.push(0.0, Open { parts: whole, steps: 0 });
+    open.push(0.0, Open { parts: [0, 1].map(|k| bodies[k].whole()), steps: 0 });
     let radius = bodies[0].radius + bodies[1].radius;
     let (mut looks, mut most) = (0, 0);
     let touch = open.search(|open, time, Open { parts, steps }| {
@@ -85,7 +83,8 @@ pub fn first_touch(bodies: &[MovingBody; 2], limits: &Limits) -> FirstTouch {
             most = most.max(steps);
             return ControlFlow::Continue(());
         }
-        let size = places[0].reach() + places[1].reach();
+        // A simple shape cannot be divided.
+        let size: f64 = places.iter().filter(|place| !place.is_simple).map(PartAt::reach).sum();
         if are_faces || found.way >= SHARE * size {
             // Faces whose time does not grow are nearer than rounding can tell.
             if steps == limits.steps || next.is_nan() || next <= time {

@@ -1,6 +1,6 @@
 //! The time at which two moving bodies first touch.
-mod cylinder_part;
 mod first_touch;
+mod gjk;
 mod moving;
 mod parting;
 
@@ -194,7 +194,7 @@ pub fn time_of_impact(
         return Err(CollideError::Option { option, found: options.iterations.to_string(), expected });
     }
     let origin = start.b.placement.pose.translation;
-    let moving = |body, motion| MovingBody::new(body, motion, origin, tolerance);
+    let moving = |body, motion| MovingBody::new(body, motion, origin);
     let mut bodies = [moving(&start.a, motion_a)?, moving(&start.b, motion_b)?];
     // Small relative to the part of the tolerance that is kept.
     let exactness = tolerance / 8.0;

@@ -1,15 +1,14 @@
 //! A moving body, and the parts of its surface at a time: nodes of its face tree and faces.
+use arrayvec::ArrayVec;
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::asset::layout::TreeChild;
 use crate::base::elementary;
 use crate::collide::clearance::Body;
-use crate::collide::scene::cylinder::Cylinder;
 use crate::collide::scene::error::CollideError;
 use crate::collide::scene::motion::{Motion, Twist};
 use crate::collide::scene::pose::Placement;
 use crate::collide::scene::shape::Shape;
-use crate::collide::time_of_impact::cylinder_part::{CylinderPart, Side};
 use crate::geometry::Triangle;
 
 /// A part of a surface.
@@ -19,11 +18,9 @@ pub enum MovingPart {
     Whole,
     /// One of the two children of a node of the face tree.
     Half { node: u32, side: u8 },
-    /// A face of a mesh, or a part of a simple shape.
+    /// A face of a mesh.
     Face(u32),
-    /// A part of a cylinder.
-    OfCylinder(CylinderPart),
-    /// All of a box or cylinder, which has no parts beside a plane.
+    /// All of a simple shape.
     Convex,
 }
 
@@ -33,7 +30,6 @@ impl MovingPart {
         match self {
             Self::Whole | Self::Half { .. } => false,
             Self::Face(_) | Self::Convex => true,
-            Self::OfCylinder(part) => part.is_face(),
         }
     }
 }
@@ -47,20 +43,16 @@ pub struct MovingBody<'a> {
     motion: Motion,
     origin: DVec3,
     twist: Twist,
-    /// The parts of a simple shape.
-    simple: Vec<Vec<DVec3>>,
-    /// The sides of the prism that stands for a cylinder.
-    side: Side,
     /// The surface lies within this distance of its parts.
     pub radius: f64,
 }
 
 impl<'a> MovingBody<'a> {
-    /// A body that is where it is at time 0. Parts of round sides are as flat as the tolerance allows.
+    /// A body that is where it is at time 0.
     ///
     /// # Errors
     /// The motion is invalid, or the body is a plane that turns.
-    pub fn new(body: &Body<'a>, motion: Motion, origin: DVec3, tolerance: f64) -> Result<Self, CollideError> {
+    pub fn new(body: &Body<'a>, motion: Motion, origin: DVec3) -> Result<Self, CollideError> {
         let Body { id, shape, placement } = *body;
         let refuse = |reason| Err(CollideError::Instance { instance: id.0, reason });
         if let Err(reason) = motion.validate() {
@@ -72,18 +64,12 @@ impl<'a> MovingBody<'a> {
                 "a plane that turns has points of any speed; expected a motion without turning".into(),
             );
         }
-        let side = match shape {
-            Shape::Cylinder { radius, .. } => Side::within(tolerance, radius * placement.scale),
-            _ => Side::within(tolerance, 0.0),
+        let radius = match shape {
+            Shape::Mesh(asset) => asset.half_thickness * asset.frame.inverse_scale(),
+            Shape::Sphere { radius } | Shape::Capsule { radius, .. } => *radius,
+            Shape::Plane | Shape::Box { .. } | Shape::Cylinder { .. } => 0.0,
         };
-        let (simple, radius) = match shape {
-            Shape::Mesh(asset) => (Vec::new(), asset.half_thickness * asset.frame.inverse_scale()),
-            // A plane is the half-space of a direction, so one of its points stands for it.
-            Shape::Plane => (vec![vec![DVec3::ZERO]], 0.0),
-            Shape::Cylinder { radius, .. } => (Vec::new(), radius * side.beside()),
-            shape => shape.parts(),
-        };
-        Ok(Self { shape, placement, motion, origin, twist, simple, side, radius: radius * placement.scale })
+        Ok(Self { shape, placement, motion, origin, twist, radius: radius * placement.scale })
     }
 
     /// Whether it is a half-space.
@@ -93,21 +79,12 @@ impl<'a> MovingBody<'a> {
 
     /// The whole surface.
     pub fn whole(&self) -> MovingPart {
-        if self.simple.len() == 1 { MovingPart::Face(0) } else { MovingPart::Whole }
-    }
-
-    /// The whole surface beside a plane, of which only the extent along one direction matters.
-    pub fn whole_beside_plane(&self) -> MovingPart {
-        match self.shape {
-            Shape::Box { .. } | Shape::Cylinder { .. } => MovingPart::Convex,
-            _ => self.whole(),
-        }
+        if matches!(self.shape, Shape::Mesh(_)) { MovingPart::Whole } else { MovingPart::Convex }
     }
 
     /// The parts of a part; none of a face.
     pub fn parts_of(&self, part: MovingPart) -> Vec<MovingPart> {
         let node = match (self.shape, part) {
-            (_, MovingPart::Face(_) | MovingPart::Convex) => return Vec::new(),
             (Shape::Mesh(asset), MovingPart::Half { node, side }) => {
                 match TreeChild::decode(asset.tree_children[node as usize][usize::from(side)]) {
                     TreeChild::Node(node) => node,
@@ -116,14 +93,8 @@ impl<'a> MovingBody<'a> {
                     }
                 }
             }
-            (Shape::Mesh(_), MovingPart::Whole) => 0,
-            (Shape::Cylinder { .. }, MovingPart::Whole) => {
-                return CylinderPart::all(self.side).into_iter().map(MovingPart::OfCylinder).collect();
-            }
-            (_, MovingPart::OfCylinder(part)) => {
-                return part.parts().into_iter().map(MovingPart::OfCylinder).collect();
-            }
-            _ => return (0..self.simple.len() as u32).map(MovingPart::Face).collect(),
+            (_, MovingPart::Whole) => 0,
+            _ => return Vec::new(),
         };
         vec![MovingPart::Half { node, side: 0 }, MovingPart::Half { node, side: 1 }]
     }
@@ -167,14 +138,14 @@ impl BodyAt<'_> {
                 *point = self.place(corners[k.min(corners.len() - 1)]);
             }
             let center = points.iter().sum::<DVec3>() / 3.0;
-            PartAt { center, extent: Extent::Hull { points, count: corners.len() } }
+            (center, Extent::Hull { points, count: corners.len() })
         };
         let of_box = |low: DVec3, high: DVec3| {
             let half = 0.5 * (high - low);
             let halves = [0, 1, 2].map(|k| self.linear.col(k) * half[k]);
-            PartAt { center: self.place(0.5 * (low + high)), extent: Extent::Box { halves } }
+            (self.place(0.5 * (low + high)), Extent::Box { halves })
         };
-        match (self.body.shape, part) {
+        let (center, extent) = match (self.body.shape, part) {
             (Shape::Mesh(asset), MovingPart::Half { node, side }) => {
                 let (boxes, _) = asset.tree_boxes[node as usize].as_chunks::<6>();
                 let corner = |k: usize| {
@@ -188,31 +159,23 @@ impl BodyAt<'_> {
                 let bounds = asset.bounds();
                 of_box(bounds.min, bounds.max)
             }
-            (&Shape::Cylinder { half_height, radius }, MovingPart::OfCylinder(part)) => {
-                let cylinder = Cylinder { half_height, radius };
-                if part.is_face() {
-                    of_face(&part.corners(&cylinder))
-                } else {
-                    let (center, halves) = part.bounds(&cylinder);
-                    let halves = halves.map(|half| self.linear * half);
-                    PartAt { center: self.place(center), extent: Extent::Box { halves } }
-                }
-            }
-            (&Shape::Cylinder { half_height, radius }, MovingPart::Convex) => {
+            (&Shape::Cylinder { half_height, radius }, _) => {
                 let [half_height, radius] =
                     [half_height, radius].map(|size| size * self.body.placement.scale);
                 let axis = self.linear.z_axis.normalize_or_zero();
-                PartAt {
-                    center: self.place(DVec3::ZERO),
-                    extent: Extent::Cylinder { axis, half_height, radius },
-                }
+                (self.place(DVec3::ZERO), Extent::Cylinder { axis, half_height, radius })
             }
-            (_, MovingPart::Face(face)) => of_face(&self.body.simple[face as usize]),
+            // A plane is the half-space of a direction, so one of its points stands for it.
+            (Shape::Plane | Shape::Sphere { .. }, _) => of_face(&[DVec3::ZERO]),
+            (&Shape::Capsule { half_height, .. }, _) => {
+                of_face(&[-half_height * DVec3::Z, half_height * DVec3::Z])
+            }
             (shape, _) => {
                 let bounds = shape.bounds();
                 of_box(bounds.min, bounds.max)
             }
-        }
+        };
+        PartAt { is_simple: part == MovingPart::Convex, center, extent }
     }
 
     /// The outward direction of a plane.
@@ -269,6 +232,8 @@ impl BodyAt<'_> {
 /// A part of a surface at a time, without the radius.
 #[derive(Clone, Copy, Debug)]
 pub struct PartAt {
+    /// Whether it is a whole simple shape.
+    pub is_simple: bool,
     /// Its middle.
     pub center: DVec3,
     extent: Extent,
@@ -298,6 +263,23 @@ impl PartAt {
         }
     }
 
+    /// A point of it that is farthest in the direction of `m`.
+    pub fn support(&self, m: DVec3) -> DVec3 {
+        match &self.extent {
+            Extent::Box { halves } => {
+                self.center + halves.iter().map(|half| half * 1f64.copysign(m.dot(*half))).sum::<DVec3>()
+            }
+            Extent::Hull { points: [first, rest @ ..], .. } => {
+                rest.iter().fold(*first, |most, p| if m.dot(*p - most) > 0.0 { *p } else { most })
+            }
+            Extent::Cylinder { axis, half_height, radius } => {
+                // Perpendicular to the axis also where `m` is along it, up to rounding.
+                let aside = axis.cross(m).cross(*axis).normalize_or_zero();
+                self.center + half_height.copysign(m.dot(*axis)) * axis + radius * aside
+            }
+        }
+    }
+
     /// Greatest distance of a point of it from its middle.
     pub fn reach(&self) -> f64 {
         match &self.extent {
@@ -307,7 +289,7 @@ impl PartAt {
         }
     }
 
-    /// The points of a face.
+    /// The points of a face, a sphere's centre or a capsule's segment.
     pub fn points(&self) -> Option<&[DVec3]> {
         match &self.extent {
             Extent::Box { .. } | Extent::Cylinder { .. } => None,
@@ -321,6 +303,16 @@ impl PartAt {
             Extent::Box { .. } | Extent::Cylinder { .. } => None,
             Extent::Hull { points, .. } => Some(Triangle::new(points)),
         }
+    }
+
+    /// The directions of its straight edges, and of the round side of a cylinder.
+    pub fn edges(&self) -> ArrayVec<DVec3, 3> {
+        let edges = match self.extent {
+            Extent::Box { halves } => halves,
+            Extent::Hull { points: [a, b, c], .. } => [b - a, c - b, a - c],
+            Extent::Cylinder { axis, .. } => [axis, DVec3::ZERO, DVec3::ZERO],
+        };
+        edges.into_iter().filter_map(DVec3::try_normalize).collect()
     }
 
     /// Directions in which it is likely to be thin.

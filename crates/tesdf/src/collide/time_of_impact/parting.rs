@@ -2,16 +2,17 @@
 //! `docs/math.md`, section 17.
 use std::iter::once;
 
-use arrayvec::ArrayVec;
 use glam::DVec3;
 
+use crate::collide::time_of_impact::gjk::separation;
 use crate::collide::time_of_impact::moving::{BodyAt, PartAt};
 use crate::geometry::polygon_to_triangle;
 
 /// What is known of two parts at a time.
 #[derive(Clone, Copy, Debug)]
 pub struct Parting {
-    /// Lower bound of their distance. Of faces, the distance.
+    /// Lower bound of their distance. Of faces, the distance; beside a simple shape, at most
+    /// [`SHARE`](crate::collide::time_of_impact::gjk::SHARE) of it more.
     pub distance: f64,
     /// For this time, they stay farther apart than the kept distance.
     pub free: f64,
@@ -66,7 +67,7 @@ impl PairAt<'_> {
             for n in parts[0].axes().chain(parts[1].axes()) {
                 offer(towards(between, n));
             }
-            match least_distance(parts) {
+            match least_distance(parts, self.radius) {
                 Some((distance, n)) => {
                     if offer(n) == 0.0 {
                         across_edges(parts, n).for_each(|n| _ = offer(n));
@@ -90,7 +91,7 @@ impl PairAt<'_> {
         if self.radius > 0.0 || self.bodies[1].plane_normal().is_some() {
             return None;
         }
-        let (_, n) = least_distance(parts)?;
+        let (_, n) = least_distance(parts, 0.0)?;
         let axes = parts[0].axes().chain(parts[1].axes());
         let axes = axes.map(|axis| towards(n, axis));
         let gap = |n: &DVec3| self.gap(parts, *n).after(0.0);
@@ -164,27 +165,27 @@ fn longest(known: f64, horizon: f64, left: impl Fn(f64) -> f64) -> f64 {
     free
 }
 
-/// The distance of two faces and the direction from the second to the first. `None` for other
-/// parts.
-fn least_distance(parts: &[PartAt; 2]) -> Option<(f64, DVec3)> {
-    let [first, triangle] = [parts[0].triangle()?, parts[1].triangle()?];
-    let points = parts[0].points()?;
-    let (_, at) = polygon_to_triangle(points, first.normal, &triangle, f64::INFINITY)?;
-    let closest = triangle.closest(at);
-    Some((closest.distance, (at - closest.point).normalize_or_zero()))
+/// The distance of two parts and the direction from the second to the first: of faces exact, beside a
+/// simple shape nearly. `None` of others, and of simple shapes that touch.
+fn least_distance(parts: &[PartAt; 2], radius: f64) -> Option<(f64, DVec3)> {
+    let [a, b] = parts;
+    if let (Some(points), Some(first), Some(second)) = (a.points(), a.triangle(), b.triangle()) {
+        let (_, at) = polygon_to_triangle(points, first.normal, &second, f64::INFINITY)?;
+        let closest = second.closest(at);
+        return Some((closest.distance, (at - closest.point).normalize_or_zero()));
+    }
+    if !(a.is_simple || b.is_simple) {
+        return None;
+    }
+    separation(radius, |m| a.support(m) - b.support(-m))
 }
 
 /// Directions near `n`, the one between the nearest points of two faces, which is rough where these
 /// are only some rounding errors apart. What faces hold between them is perpendicular to their
 /// edges: to one from a vertex to an edge, to two between edges. Faces have their normals.
 fn across_edges(parts: &[PartAt; 2], n: DVec3) -> impl Iterator<Item = DVec3> {
-    let edges = [0, 1].map(|k| {
-        let points = parts[k].points().unwrap_or_default();
-        let edge = move |i: usize| (points[(i + 1) % points.len()] - points[i]).try_normalize();
-        (0..points.len()).filter_map(edge).collect::<ArrayVec<DVec3, 3>>()
-    });
-    let [a, b] = edges.clone();
-    let to_edge = edges.into_iter().flatten().map(move |edge| n.reject_from_normalized(edge));
+    let [a, b] = [0, 1].map(|k| parts[k].edges());
+    let to_edge = a.clone().into_iter().chain(b.clone()).map(move |edge| n.reject_from_normalized(edge));
     let between = a.into_iter().flat_map(move |a| b.clone().into_iter().map(move |b| a.cross(b)));
     let near = move |m: DVec3| {
         let m = towards(n, m.try_normalize()?);
@@ -231,14 +232,20 @@ impl Bound {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::collide::clearance::Body;
+    use crate::TeSdf;
+    use crate::collide::clearance::{Body, Pair};
     use crate::collide::scene::Velocity;
     use crate::collide::scene::ids::InstanceId;
     use crate::collide::scene::motion::Motion;
     use crate::collide::scene::pose::{Placement, Pose};
     use crate::collide::scene::shape::Shape;
+    use crate::collide::time_of_impact::gjk::SHARE;
     use crate::collide::time_of_impact::moving::{MovingBody, MovingPart};
+    use crate::encode::{Encoder, Preset};
+    use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
     use glam::DQuat;
 
     fn motions() -> [Motion; 5] {
@@ -269,52 +276,120 @@ mod tests {
         ]
     }
 
-    #[test]
-    fn parts_stay_apart_for_the_time_that_is_told() {
-        let shape = Shape::Box { half_extents: DVec3::new(1.0, 2.0, 0.5) };
-        let places = [
+    const KEPT: f64 = 0.01;
+
+    /// How often a free time was told, and how often it was nearly that until the parts are near.
+    #[derive(Default)]
+    struct Told {
+        free: u32,
+        reached: u32,
+    }
+
+    impl Told {
+        /// Compares what is told of two parts with their distance, of which `None` is not known.
+        fn check(
+            &mut self,
+            bodies: &[MovingBody; 2],
+            parts: [MovingPart; 2],
+            distance: impl Fn(f64) -> Option<f64>,
+        ) {
+            let start = 0.2;
+            let pair = PairAt { bodies: [0, 1].map(|k| bodies[k].at(start)), radius: RADIUS, time: start };
+            let places = [0, 1].map(|k| pair.bodies[k].part(parts[k]));
+            let found = pair.parting(&places, KEPT, 20.0);
+            let until = found.free.min(20.0);
+            self.free += u32::from(found.free > 0.0);
+            for k in 0..=20 {
+                let Some(now) = distance(start + until * f64::from(k) / 20.0) else { continue };
+                assert!(
+                    k > 0 || found.distance <= now + SHARE * now.abs() + EXACT,
+                    "{parts:?}: {now}, {found:?}"
+                );
+                assert!(found.free == 0.0 || now >= KEPT - EXACT, "{parts:?}, {k}: {now}, {found:?}");
+                self.reached += u32::from(k == 20 && found.free < 20.0 && now < 4.0 * KEPT);
+            }
+        }
+    }
+
+    const RADIUS: f64 = 0.1;
+    const EXACT: f64 = 1e-9;
+    const SCALE: f64 = 0.8;
+
+    const BOX: DVec3 = DVec3::new(1.0, 2.0, 0.5);
+
+    fn places() -> [Pose; 2] {
+        [
             Pose { translation: DVec3::new(3.0, 0.5, 0.2), rotation: DQuat::from_rotation_y(1.1) },
             Pose { translation: DVec3::ZERO, rotation: DQuat::from_rotation_x(0.4) },
-        ];
-        let kept = 0.01;
-        let (mut reached, mut told) = (0, 0);
-        for [a, b] in motions().into_iter().flat_map(|a| motions().map(|b| [a, b])) {
-            let [a, b] = [(0, a), (1, b)].map(|(k, motion)| {
-                let placement = Placement { pose: places[k], scale: 0.8 };
-                let body = Body { id: InstanceId(k as u32), shape: &shape, placement };
-                MovingBody::new(&body, motion, DVec3::X, 1e-6).expect("a motion")
+        ]
+    }
+
+    fn placed(shape: &Shape, k: usize, pose: Pose) -> Body<'_> {
+        Body { id: InstanceId(k as u32), shape, placement: Placement { pose, scale: SCALE } }
+    }
+
+    /// The faces of a box of side 2.
+    fn cube() -> TeSdf {
+        let obj = "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n\
+                   f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+        let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj).expect("a mesh").mesh;
+        let solid = SolidMesh::new(mesh).expect("a solid");
+        Encoder::new().preset(Preset::Fast).encode(&solid).expect("an asset")
+    }
+
+    #[test]
+    fn parts_stay_apart_for_the_time_that_is_told() {
+        let mesh = Shape::Mesh(Arc::new(cube()));
+        let mut told = Told::default();
+        for motions in motions().into_iter().flat_map(|a| motions().map(|b| [a, b])) {
+            let bodies = [0, 1].map(|k| {
+                MovingBody::new(&placed(&mesh, k, places()[k]), motions[k], DVec3::X).expect("a motion")
             });
-            let pair = |time: f64| PairAt { bodies: [a.at(time), b.at(time)], radius: 0.1, time };
             for (first, second) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
-                for parts in [
-                    [MovingPart::Face(first), MovingPart::Face(second)],
-                    [MovingPart::Face(first), MovingPart::Whole],
-                    [MovingPart::Whole, MovingPart::Whole],
-                ] {
-                    let start = 0.2;
-                    let parting = |time: f64| {
-                        let pair = pair(time);
-                        pair.parting(&[0, 1].map(|k| pair.bodies[k].part(parts[k])), kept, 20.0)
-                    };
-                    let faces = |time: f64| {
-                        let pair = pair(time);
-                        let places = [MovingPart::Face(first), MovingPart::Face(second)];
-                        let places = [0, 1].map(|k| pair.bodies[k].part(places[k]));
-                        least_distance(&places).expect("faces").0 - pair.radius
-                    };
-                    let Parting { free, distance, .. } = parting(start);
-                    assert!(distance <= faces(start) + 1e-12);
-                    let until = free.min(20.0);
-                    told += usize::from(free > 0.0);
-                    for k in 0..=20 {
-                        let gap = faces(start + until * f64::from(k) / 20.0);
-                        assert!(gap >= kept - 1e-12, "{parts:?} {k} of {free}: {gap}");
-                        reached += usize::from(k == 20 && free < 20.0 && gap < 4.0 * kept);
-                    }
+                let [first, second] = [first, second].map(MovingPart::Face);
+                let distance = |time: f64| {
+                    let places = [bodies[0].at(time).part(first), bodies[1].at(time).part(second)];
+                    Some(least_distance(&places, 0.0)?.0 - RADIUS)
+                };
+                for parts in
+                    [[first, second], [first, MovingPart::Whole], [MovingPart::Whole, MovingPart::Whole]]
+                {
+                    told.check(&bodies, parts, distance);
                 }
             }
         }
         // Often, it is nearly the time at which they meet.
-        assert!(told > 2000 && reached > 20, "{told} {reached}");
+        assert!(told.free > 2000 && told.reached > 20, "{} {}", told.free, told.reached);
+    }
+
+    #[test]
+    fn simple_shapes_stay_apart_for_the_time_that_is_told() {
+        let shapes = [
+            Shape::Box { half_extents: BOX },
+            Shape::Cylinder { half_height: 0.1, radius: 1.5 },
+            Shape::Cylinder { half_height: 2.0, radius: 0.3 },
+            Shape::Mesh(Arc::new(cube())),
+        ];
+        let mut told = Told::default();
+        for motions in motions().into_iter().flat_map(|a| motions().map(|b| [a, b])) {
+            for (first, second) in (0..3).flat_map(|i| (0..4).map(move |j| (i, j))) {
+                let at = |time: f64| {
+                    [(0, first), (1, second)].map(|(k, shape): (usize, usize)| {
+                        placed(&shapes[shape], k, motions[k].pose_at(places()[k], time))
+                    })
+                };
+                let bodies = at(0.0)
+                    .each_ref()
+                    .map(|body| MovingBody::new(body, motions[body.id.0 as usize], DVec3::X));
+                let bodies = bodies.map(|body| body.expect("a motion"));
+                // The surface of a mesh may be inside, where nothing is told.
+                let distance = |time: f64| {
+                    let [a, b] = at(time);
+                    Some(Pair { a, b }.apart(1e-10).ok()?.distance - RADIUS)
+                };
+                told.check(&bodies, [MovingPart::Convex, bodies[1].whole()], distance);
+            }
+        }
+        assert!(told.free > 150 && told.reached > 5, "{} {}", told.free, told.reached);
     }
 }
