@@ -79,7 +79,7 @@ const LARGE_FAN: usize = 512;
 const DROPPED: u32 = u32::MAX;
 
 /// More candidates than this are thinned out by rule A alone.
-const MANY: usize = 1 << 12;
+pub(super) const MANY: usize = 1 << 12;
 
 /// Applies rules A (point), B (plane) and C (shared feature) to the candidates of a cell.
 ///

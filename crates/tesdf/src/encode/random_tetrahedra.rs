@@ -4,12 +4,12 @@ use glam::DVec3;
 use proptest::prelude::*;
 
 use super::candidates::Pool;
-use super::filter::{Scratch, filter};
+use super::filter::{MANY, PAD, Scratch, filter};
 use super::surface::{Surface, Touching};
 use super::tighten::tighten;
 use crate::base::{Chains, Isa};
 use crate::domain::Cell;
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, triangle_meets_tetrahedron};
 use crate::mesh::TriangleMesh;
 use crate::sampling::Random;
 
@@ -76,7 +76,8 @@ fn soup(kind: Soup, random: &mut Random) -> TriangleMesh {
     TriangleMesh::new(vertices, faces).expect("valid ids")
 }
 
-fn tetrahedron(random: &mut Random) -> Cell {
+/// Half of them have a corner on a face or next to it.
+fn tetrahedron(surface: &Surface, random: &mut Random) -> Cell {
     let size = 10f64.powf(random.between(-6.0, -0.3));
     let at = 0.4 * in_cube(random);
     let corner = |random: &mut Random| match random.below(2) {
@@ -84,7 +85,14 @@ fn tetrahedron(random: &mut Random) -> Cell {
         _ => at + size * in_cube(random).round(),
     };
     loop {
-        let corners = std::array::from_fn(|_| corner(random));
+        let mut corners: [DVec3; 4] = std::array::from_fn(|_| corner(random));
+        if random.below(2) == 0 {
+            let [a, b, c] = surface.triangles[random.below(surface.triangles.len())].corners;
+            let beside = 10f64.powf(random.between(-16.0, -8.0)) * random.direction();
+            let way =
+                a.lerp(b, random.between(0.0, 0.5)).lerp(c, random.between(0.0, 0.5)) + beside - corners[0];
+            corners.iter_mut().for_each(|p| *p += way);
+        }
         let cell = Cell { corners, depth: random.below(3) as u32 };
         if cell.volume() > 1e-3 * size.powi(3) {
             return cell;
@@ -98,8 +106,9 @@ proptest! {
     #[test]
     fn lists_of_random_tetrahedra_keep_the_least_distance(kind in prop::sample::select(SOUPS.to_vec()), seed in any::<u64>(), levels in 0u32..9) {
         let mut random = Random::new(seed, 0);
-        let mut surface = Surface::new(&soup(kind, &mut random), 1.0, Touching::Kept);
-        let cell = tetrahedron(&mut random);
+        let mesh = soup(kind, &mut random);
+        let mut surface = Surface::new(&mesh, 1.0, Touching::Kept);
+        let cell = tetrahedron(&surface, &mut random);
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let pool = Pool::new(&surface, &all, &cell);
         let candidates = pool.candidates();
@@ -108,7 +117,20 @@ proptest! {
         surface.isa = Isa::Baseline;
         let scalar = filter(&surface, &cell, &candidates, Chains::NONE, &mut scratch);
         prop_assert_eq!(&filtered.survivors, &scalar.survivors);
+        prop_assert_eq!(filtered.crossing, scalar.crossing);
         let survivors: Vec<u32> = filtered.survivors.iter().map(|s| candidates.faces[s.index as usize]).collect();
+        // Of corners, the test of a triangle and a tetrahedron says less than twice their distance.
+        let meets = |face: u32, pad| triangle_meets_tetrahedron(&surface.triangles[face as usize].corners, &cell.corners, pad);
+        for &face in all.iter().filter(|&&face| meets(face, 0.5 * PAD)) {
+            prop_assert!(filtered.crossing && survivors.contains(&face), "{face} meets the cell");
+        }
+        for (survivor, &face) in filtered.survivors.iter().zip(&survivors) {
+            prop_assert!(!survivor.meets || filtered.crossing && meets(face, PAD), "{face} is away from the cell");
+        }
+        let apart = Surface::new(&mesh, 1.0, Touching::Ignored);
+        let ignored = filter(&apart, &cell, &candidates, Chains::NONE, &mut scratch);
+        prop_assert!(!ignored.crossing && ignored.survivors.iter().all(|s| !s.meets), "{:?}", ignored);
+        let ignored: Vec<u32> = ignored.survivors.iter().map(|s| candidates.faces[s.index as usize]).collect();
         let mut required: Vec<_> = filtered.survivors.iter().map(|s| s.requirement).collect();
         required.sort_unstable();
         let cover = surface.cover(&required);
@@ -123,10 +145,62 @@ proptest! {
         points.extend((0..64).map(|_| random.in_simplex(&cell.corners)));
         for p in points {
             let exact = least(&all, p);
-            for (name, faces) in [("survivors", &survivors), ("cover", &cover), ("tightened", &tight)] {
+            for (name, faces) in [("survivors", &survivors), ("touching ignored", &ignored), ("cover", &cover), ("tightened", &tight)] {
                 let excess = least(faces, p) - exact;
                 prop_assert!(excess <= 5e-14, "{}: farther by {:e} at {}", name, excess, p);
             }
+        }
+    }
+}
+
+#[test]
+fn cells_of_many_candidates_keep_all_that_may_meet_them() {
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| 0.1 * axis);
+    let cell = Cell { corners: [DVec3::ZERO, x, y, z], depth: 0 };
+    let center = cell.centroid();
+    let outward = (x - center).normalize();
+    let (u, v) = outward.any_orthonormal_pair();
+    // Before the corner that is farthest from the middle, beyond it, and far away.
+    for (at, meets) in
+        [(x, true), (x + 0.5 * PAD * outward, true), (x + 1e-6 * outward, false), (0.5 * outward, false)]
+    {
+        let corners = [at + 0.01 * u, at + 0.01 * v, at - 0.01 * (u + v)];
+        let mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]; MANY + 1]).expect("valid ids");
+        for touching in [Touching::Kept, Touching::Ignored] {
+            let surface = Surface::new(&mesh, 1.0, touching);
+            let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
+            let pool = Pool::new(&surface, &all, &cell);
+            let filtered = filter(&surface, &cell, &pool.candidates(), Chains::NONE, &mut Scratch::default());
+            let kept = touching == Touching::Kept;
+            assert_eq!(filtered.crossing, kept && meets, "{at} {touching:?}");
+            assert_eq!(filtered.survivors.len(), all.len(), "{at} {touching:?}");
+            assert!(filtered.survivors.iter().all(|survivor| survivor.meets == kept), "{at} {touching:?}");
+        }
+    }
+}
+
+#[test]
+fn faces_behind_another_are_kept_where_they_meet_the_cell() {
+    // The cell stands on the tip of a face, above that of another one. So of all corners, the first
+    // tip is nearer.
+    let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+    let cell = Cell {
+        corners: [DVec3::ZERO, at(0.03, 0.0, 0.3), at(-0.02, 0.02, 0.3), at(-0.02, -0.02, 0.3)],
+        depth: 0,
+    };
+    for (below, meets) in [(0.4 * PAD, true), (0.9 * PAD, true), (1.1 * PAD, false), (1e-6, false)] {
+        let tip = |z: f64| [at(0.0, 0.0, -z), at(0.01, 0.0, -0.1), at(0.0, 0.01, -0.1)];
+        for lifted in [0.0, 1e-6] {
+            let vertices = [tip(0.0), tip(below)].concat();
+            let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [3, 4, 5]]).expect("valid ids");
+            let surface = Surface::new(&mesh, 1.0, Touching::Kept);
+            let cell = Cell { corners: cell.corners.map(|p| p + lifted * DVec3::Z), ..cell };
+            let pool = Pool::new(&surface, &[0, 1], &cell);
+            let filtered = filter(&surface, &cell, &pool.candidates(), Chains::NONE, &mut Scratch::default());
+            let kept: Vec<u32> = filtered.survivors.iter().map(|survivor| survivor.index).collect();
+            let expected: &[u32] = if meets && lifted == 0.0 { &[0, 1] } else { &[0] };
+            assert_eq!(kept, expected, "{below} {lifted}");
+            assert_eq!(filtered.crossing, lifted == 0.0);
         }
     }
 }
