@@ -3,23 +3,7 @@
 
 use std::process::Command;
 
-use crate::folder::{Folder, texts};
-
-const DROP: &str = r#"
-time_step = 1e-3
-duration = 0.01
-
-[[bodies]]
-name = "floor"
-shape = "plane"
-fixed = true
-
-[[bodies]]
-name = "ball"
-shape = { sphere = { radius = 0.01 } }
-density = 1000
-translation = [0, 0, 0.011]
-"#;
+use crate::folder::{DROP, Folder, texts};
 
 /// Runs the binary with a memory limit in kB.
 fn within(kilobytes: u32, folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
@@ -34,16 +18,16 @@ fn within(kilobytes: u32, folder: &Folder, args: &[&str]) -> (Option<i32>, Strin
 fn scenes_over_a_limit_are_refused_with_key_and_line() {
     let folder = Folder::new();
     for (from, to, expected) in [
-        ("duration = 0.01", "duration = 1e318", "line 3"),
+        ("duration = 0.02", "duration = 1e318", "line 3"),
         (
-            "time_step = 1e-3",
+            "time_step = 2e-3",
             "time_step = 1e-318",
-            "s.toml, line 3: duration: 0.01 s in steps of 1e-318 s; expected at most",
+            "s.toml, line 3: duration: 0.02 s in steps of 1e-318 s; expected at most",
         ),
         (
-            "duration = 0.01",
+            "duration = 0.02",
             "duration = 1e300",
-            "s.toml, line 3: duration: 1e300 s in steps of 0.001 s; expected at most",
+            "s.toml, line 3: duration: 1e300 s in steps of 0.002 s; expected at most",
         ),
         (
             "\n[[bodies]]\nname = \"floor\"",
@@ -67,7 +51,7 @@ fn scenes_over_a_limit_are_refused_with_key_and_line() {
 fn a_run_that_does_not_fit_the_memory_is_refused_before_its_first_step() {
     let folder = Folder::new();
     folder.write("s.toml", DROP);
-    let long = ["simulate", "s.toml", "-o", "run", "--duration", "20000"];
+    let long = ["simulate", "s.toml", "-o", "run", "--duration", "40000"];
     let (code, out, err) = within(1 << 21, &folder, &long);
     assert_eq!((code, out.as_str()), (Some(2), ""), "{err}");
     assert!(err.contains("no memory is left for 20000000 steps of 2 bodies"), "{err}");

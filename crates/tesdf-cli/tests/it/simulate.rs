@@ -1,23 +1,7 @@
 //! `tesdf simulate`
 
-use crate::folder::Folder;
+use crate::folder::{DROP, Folder};
 use tesdf_sim::RunRecord;
-
-const DROP: &str = r#"
-time_step = 2e-3
-duration = 0.02
-
-[[bodies]]
-name = "floor"
-shape = "plane"
-fixed = true
-
-[[bodies]]
-name = "ball"
-shape = { sphere = { radius = 0.01 } }
-density = 1000
-translation = [0, 0, 0.011]
-"#;
 
 /// The ball has no thread, so it cannot meet this criterion.
 const SCREW: &str = r#"

@@ -7,6 +7,23 @@ use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{PartialRun, RunJournal, RunOrigin, simulate_from};
 
+/// A ball that drops on a floor, in ten steps.
+pub const DROP: &str = r#"
+time_step = 2e-3
+duration = 0.02
+
+[[bodies]]
+name = "floor"
+shape = "plane"
+fixed = true
+
+[[bodies]]
+name = "ball"
+shape = { sphere = { radius = 0.01 } }
+density = 1000
+translation = [0, 0, 0.011]
+"#;
+
 pub struct Folder(tempfile::TempDir);
 
 impl Folder {

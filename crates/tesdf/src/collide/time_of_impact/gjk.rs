@@ -6,7 +6,7 @@ use glam::DVec3;
 use crate::geometry::{Feature, Triangle};
 
 /// A distance is at most this share of it more than the least one.
-pub const SHARE: f64 = 1e-3;
+pub const RELATIVE_ERROR: f64 = 1e-3;
 
 /// Number of support points after which the search stops. Nearly all take less than 20.
 const MOST: u32 = 100;
@@ -28,7 +28,7 @@ pub fn separation(radius: f64, support: impl Fn(DVec3) -> DVec3) -> Option<(f64,
         if bound > farthest.0 {
             farthest = (bound, direction);
         }
-        if distance - farthest.0 <= SHARE * (distance - radius).abs() || simplex.contains(&beyond) {
+        if distance - farthest.0 <= RELATIVE_ERROR * (distance - radius).abs() || simplex.contains(&beyond) {
             break;
         }
         simplex.push(beyond);
@@ -103,7 +103,7 @@ mod tests {
         // A direction between points of size 1 is that of their rounded difference.
         let rounding = 1e-14 * (1.0 + distance) + 8.0 * f64::EPSILON / distance;
         assert!(found >= distance - rounding && bound <= distance + rounding, "{bound} {distance} {found}");
-        assert!(found - bound <= SHARE * found + rounding, "{bound} {distance} {found}");
+        assert!(found - bound <= RELATIVE_ERROR * found + rounding, "{bound} {distance} {found}");
     }
 
     #[test]

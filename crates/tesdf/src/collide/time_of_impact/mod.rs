@@ -141,7 +141,7 @@ impl TimeOfImpact {
 /// account how fast they come nearer perpendicular to the plane, not along it. So surfaces that
 /// slide past each other at a small gap take few steps. It is conservative advancement (Mirtich
 /// 1996; with face trees, Tang, Kim and Manocha 2009), for each pair of parts. Nothing is sampled,
-/// so thin or fast bodies cannot pass through each other. Proof: `docs/math.md`, section 17.
+/// so thin or fast bodies cannot pass through each other. Simple shapes are one part. Proof: `docs/math.md`, section 17.
 ///
 /// The velocities of the instances are not used; pass them as [`Motion::Linear`].
 ///

@@ -21,7 +21,7 @@ pub enum MovingPart {
     /// A face of a mesh.
     Face(u32),
     /// All of a simple shape.
-    Convex,
+    Simple,
 }
 
 impl MovingPart {
@@ -29,7 +29,7 @@ impl MovingPart {
     pub fn is_face(&self) -> bool {
         match self {
             Self::Whole | Self::Half { .. } => false,
-            Self::Face(_) | Self::Convex => true,
+            Self::Face(_) | Self::Simple => true,
         }
     }
 }
@@ -79,7 +79,7 @@ impl<'a> MovingBody<'a> {
 
     /// The whole surface.
     pub fn whole(&self) -> MovingPart {
-        if matches!(self.shape, Shape::Mesh(_)) { MovingPart::Whole } else { MovingPart::Convex }
+        if matches!(self.shape, Shape::Mesh(_)) { MovingPart::Whole } else { MovingPart::Simple }
     }
 
     /// The parts of a part; none of a face.
@@ -175,7 +175,7 @@ impl BodyAt<'_> {
                 of_box(bounds.min, bounds.max)
             }
         };
-        PartAt { is_simple: part == MovingPart::Convex, center, extent }
+        PartAt { is_simple: part == MovingPart::Simple, center, extent }
     }
 
     /// The outward direction of a plane.

@@ -12,7 +12,7 @@ use crate::geometry::polygon_to_triangle;
 #[derive(Clone, Copy, Debug)]
 pub struct Parting {
     /// Lower bound of their distance. Of faces, the distance; beside a simple shape, at most
-    /// [`SHARE`](crate::collide::time_of_impact::gjk::SHARE) of it more.
+    /// [`RELATIVE_ERROR`](crate::collide::time_of_impact::gjk::RELATIVE_ERROR) of it more.
     pub distance: f64,
     /// For this time, they stay farther apart than the kept distance.
     pub free: f64,
@@ -242,7 +242,7 @@ mod tests {
     use crate::collide::scene::motion::Motion;
     use crate::collide::scene::pose::{Placement, Pose};
     use crate::collide::scene::shape::Shape;
-    use crate::collide::time_of_impact::gjk::SHARE;
+    use crate::collide::time_of_impact::gjk::RELATIVE_ERROR;
     use crate::collide::time_of_impact::moving::{MovingBody, MovingPart};
     use crate::encode::{Encoder, Preset};
     use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
@@ -302,7 +302,7 @@ mod tests {
             for k in 0..=20 {
                 let Some(now) = distance(start + until * f64::from(k) / 20.0) else { continue };
                 assert!(
-                    k > 0 || found.distance <= now + SHARE * now.abs() + EXACT,
+                    k > 0 || found.distance <= now + RELATIVE_ERROR * now.abs() + EXACT,
                     "{parts:?}: {now}, {found:?}"
                 );
                 assert!(found.free == 0.0 || now >= KEPT - EXACT, "{parts:?}, {k}: {now}, {found:?}");
@@ -387,7 +387,7 @@ mod tests {
                     let [a, b] = at(time);
                     Some(Pair { a, b }.apart(1e-10).ok()?.distance - RADIUS)
                 };
-                told.check(&bodies, [MovingPart::Convex, bodies[1].whole()], distance);
+                told.check(&bodies, [MovingPart::Simple, bodies[1].whole()], distance);
             }
         }
         assert!(told.free > 150 && told.reached > 5, "{} {}", told.free, told.reached);
