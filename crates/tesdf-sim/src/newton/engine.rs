@@ -17,7 +17,7 @@ use super::look::Look;
 use super::passing::{MOST_TURN, Passing};
 use super::rotation::Rotation;
 use super::rows::FreeBody;
-use super::seen::Seen;
+use super::seen::{Detection, Seen};
 use super::sleep::Sleep;
 use super::step::{Step, set_velocities};
 use super::stopwatch::Stopwatch;
@@ -210,36 +210,16 @@ impl Newton {
         CollideOptions { contact_distance, speculative_time, ..self.collide }
     }
 
+    /// What is detected with the bodies in these states, as far ahead as their velocities move them.
     pub(super) fn detect(
         &mut self,
         step: &mut Step,
         states: &[State],
         hidden: HiddenSearch,
-    ) -> Result<Contacts, DynamicsError> {
+    ) -> Result<Arc<Detection>, DynamicsError> {
         let start = Stopwatch::start();
         let options = CollideOptions { hidden, ..self.options_of(step.h) };
-        let contacts = self.detector.detect(self.system.scene_at(states)?, &options)?;
-        step.report.detections += 1;
-        step.report.detection += start.elapsed();
-        Ok(contacts)
-    }
-
-    pub(super) fn gaps<'a>(&'a self, step: &'a Step) -> Gaps<'a> {
-        let Self { system, options, sizes, collide: CollideOptions { mode, .. }, .. } = self;
-        Gaps { system, options, sizes, mode: *mode, step }
-    }
-
-    /// Detects as far ahead as the velocities of `ahead` move the bodies.
-    fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
-        Ok(Look::new(self.detect(step, ahead, HiddenSearch::On)?))
-    }
-
-    /// The first look of a part: it looks only at pairs of which a body has moved since the last
-    /// one.
-    fn first_look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
-        let start = Stopwatch::start();
-        let options = CollideOptions { hidden: HiddenSearch::On, ..self.options_of(step.h) };
-        self.system.scene_at(ahead)?;
+        self.system.scene_at(states)?;
         let contacts = match self.seen.unmoved(&self.system, &options) {
             None => self.detector.detect(self.system.scene(), &options)?,
             Some(unmoved) => {
@@ -252,13 +232,24 @@ impl Newton {
                         found?
                     }
                 };
-                self.seen.with(found, &unmoved, &self.system)
+                unmoved.with(found, &self.system)
             }
         };
-        self.seen.keep(&self.system, &options, &contacts);
         step.report.detections += 1;
         step.report.detection += start.elapsed();
-        Ok(Look::new(contacts))
+        let detection = Detection::new(&self.system, &options, contacts);
+        self.seen.add(detection.clone());
+        Ok(detection)
+    }
+
+    pub(super) fn gaps<'a>(&'a self, step: &'a Step) -> Gaps<'a> {
+        let Self { system, options, sizes, collide: CollideOptions { mode, .. }, .. } = self;
+        Gaps { system, options, sizes, mode: *mode, step }
+    }
+
+    /// Detects as far ahead as the velocities of `ahead` move the bodies.
+    fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Arc<Detection>, DynamicsError> {
+        self.detect(step, ahead, HiddenSearch::On)
     }
 
     /// Whether no body moves so far with the velocities of `ahead` that a look would have to be
@@ -400,7 +391,9 @@ impl Newton {
         let falling = pack(time_step * self.system.gravity, DVec3::ZERO);
         let target: Vec<_> = step.target.iter().map(|v| v - falling).collect();
         set_velocities(&mut ahead, &step.free, &target);
-        let mut look = self.first_look(&mut step, &ahead)?;
+        let first = self.look(&mut step, &ahead)?;
+        self.seen.begin(first.clone());
+        let mut look = Look::new(first.contacts().clone());
         if self.wakes(look.contacts.as_slice()) {
             return Ok(Made::Again);
         }
@@ -414,7 +407,7 @@ impl Newton {
             if !self.look_on(&step, &mut look, &mut ahead, &solved.velocities)? {
                 break;
             }
-            let mut more = self.look(&mut step, &ahead)?;
+            let mut more = Look::new(self.look(&mut step, &ahead)?.contacts().clone());
             more.measure(self.system.scene(), &self.options_of(step.h))?;
             if !look.extend(more, self.system.scene()) {
                 break;
@@ -547,6 +540,7 @@ impl Dynamics for Newton {
         let states = self.system.states().to_vec();
         self.kept.begin();
         let made = self.in_parts(time_step);
+        self.seen.end();
         self.unmark();
         match &made {
             Ok(_) => self.kept.end(),

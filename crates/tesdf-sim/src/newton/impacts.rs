@@ -56,9 +56,10 @@ impl Newton {
             }
             step.report.advances += 1;
             let predicted = self.moved(step, &hit.velocities);
-            let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
+            let detection = self.detect(step, &predicted, HiddenSearch::Off)?;
             let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-            let (found, rows, _) = self.gaps(step).find(contacts.as_slice(), &poses, Reach::All, 0.0);
+            let (found, rows, _) =
+                self.gaps(step).find(detection.contacts().as_slice(), &poses, Reach::All, 0.0);
             let more = self.gaps(step).shares(&found, &rows, &target, FAR);
             let mut most = 0.0f64;
             for ((share, more), _) in shares.iter_mut().zip(more).zip(&hit.is_hit).filter(|(_, hit)| **hit) {

@@ -1,19 +1,29 @@
-//! What the last look has found, so that bodies that have not moved since are not looked at again.
+//! What earlier detections have found, so that bodies that have not moved since are not looked at
+//! again.
 //!
 //! What is found of a pair depends on the states of its two bodies and on the options alone. Where
 //! these are the same bit for bit, so are the contacts of a new detection. So this is no part of
 //! the state of a run: nothing changes where it is dropped.
 use std::iter::zip;
+use std::sync::Arc;
 
 use tesdf::collide::{CollideOptions, Contact, Contacts, Instance, InstanceId};
 
 use crate::{Body, System};
 
-/// The last look: the scene that it has looked at, and what it found.
+/// What the first detection of a part of a step has found, and those that followed it. A part that
+/// is solved again, because bodies close faster than was foreseen, predicts most poses again.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
-    /// `None` before the first one.
-    options: Option<CollideOptions>,
+    /// `None` before the first part.
+    first: Option<Arc<Detection>>,
+    later: Vec<Arc<Detection>>,
+}
+
+/// A detection.
+#[derive(Debug)]
+pub struct Detection {
+    options: CollideOptions,
     /// Of each body.
     instances: Vec<Instance>,
     /// The bodies between which nothing was detected.
@@ -23,74 +33,77 @@ pub struct Seen {
 
 /// Which bodies of a scene need not be looked at.
 pub struct Unmoved {
-    /// Of each body, whether it is as the last look saw it.
+    /// Of each body, whether an earlier detection saw it as it is now.
     bodies: Vec<bool>,
     /// Of each body, whether the caller has marked it as still.
     still: Vec<bool>,
+    /// The earlier detection.
+    seen: Arc<Detection>,
 }
 
 impl Seen {
-    /// The bodies whose pairs the last look has seen as they are now. `None` where there are none,
-    /// or where marks cannot tell which they are.
+    /// The bodies whose pairs an earlier detection with these options has seen as they are now: the
+    /// one that saw most of them. `None` where there are none, or where marks cannot tell which they
+    /// are.
     pub fn unmoved(&self, system: &System, options: &CollideOptions) -> Option<Unmoved> {
-        if self.options != Some(*options) {
-            return None;
-        }
-        let still = still(system);
-        let is_seen = |(k, body): (usize, &Body)| {
-            // Nothing was detected between bodies that were still.
-            let was_still = self.still[k] && !still[k];
-            let now = system.scene().instance(body.instance);
-            !was_still && now.is_ok_and(|now| is_same(now, &self.instances[k]))
-        };
-        let bodies: Vec<bool> = system.bodies().iter().enumerate().map(is_seen).collect();
-        // Marks say of bodies, not of pairs, that nothing is to be detected.
-        let fits = bodies.contains(&true) && zip(&still, &bodies).all(|(still, seen)| *seen || !still);
-        fits.then_some(Unmoved { bodies, still })
+        let same = self.first.iter().chain(&self.later).filter(|seen| seen.options == *options);
+        let unmoved = same.filter_map(|seen| Unmoved::since(seen, system));
+        unmoved.max_by_key(|unmoved| unmoved.bodies.iter().filter(|seen| **seen).count())
     }
 
-    /// The contacts of a scene of whose pairs with a body that has moved `found` are those.
-    pub fn with(&self, found: Contacts, unmoved: &Unmoved, system: &System) -> Contacts {
-        // A detector may ignore marks.
-        let is_found = |a: InstanceId, b: InstanceId| !are(&unmoved.bodies, [a, b], system);
-        let is_seen = |a: InstanceId, b: InstanceId| !is_found(a, b) && !are(&unmoved.still, [a, b], system);
-        let world = |id| system.scene().instance(id).map_or(0, |instance| instance.world);
-        let key = |a: InstanceId, b: InstanceId| (world(a), a.min(b), a.max(b));
-        let of_pairs = |contacts| pairs(contacts).map(|(run, [a, b])| (key(a, b), run, [a, b]));
-        let mut runs: Vec<_> = of_pairs(found.as_slice()).filter(|(.., [a, b])| is_found(*a, *b)).collect();
-        runs.extend(of_pairs(self.contacts.as_slice()).filter(|(.., [a, b])| is_seen(*a, *b)));
-        runs.sort_by_key(|(key, ..)| *key);
-        let mut contacts = Vec::with_capacity(found.len() + self.contacts.len());
-        runs.iter().for_each(|(_, run, _)| contacts.extend_from_slice(run));
-        let Contacts { statistics, mut hidden, mut reductions, .. } = found;
-        hidden.retain(|h| is_found(h.instance_a, h.instance_b));
-        hidden.extend(self.contacts.hidden.iter().filter(|h| is_seen(h.instance_a, h.instance_b)));
-        hidden.sort_by_key(|h| key(h.instance_a, h.instance_b));
-        reductions.retain(|r| is_found(r.instance_a, r.instance_b));
-        let of_seen = self.contacts.reductions.iter();
-        reductions.extend(of_seen.filter(|r| is_seen(r.instance_a, r.instance_b)).copied());
-        reductions.sort_by_key(|r| key(r.instance_a, r.instance_b));
-        Contacts::new(contacts, statistics, reductions, hidden)
+    /// Keeps the first detection of a part, and forgets those before.
+    pub fn begin(&mut self, first: Arc<Detection>) {
+        self.first = Some(first);
+        self.later.clear();
     }
 
-    /// Keeps what a look has found in the scene as it is now.
-    pub fn keep(&mut self, system: &System, options: &CollideOptions, contacts: &Contacts) {
-        self.options = Some(*options);
-        self.still = still(system);
-        self.instances.clear();
+    /// Keeps another detection of the part.
+    pub fn add(&mut self, detection: Arc<Detection>) {
+        self.later.push(detection);
+    }
+
+    /// Ends the step: of its detections, the first one of the last part is kept.
+    pub fn end(&mut self) {
+        self.later.clear();
+    }
+}
+
+impl Detection {
+    /// What was found in the scene as it is now.
+    pub fn new(system: &System, options: &CollideOptions, contacts: Contacts) -> Arc<Self> {
         let instances = system.bodies().iter().map(|body| system.scene().instance(body.instance));
-        self.instances.extend(instances.flatten());
-        self.contacts.clone_from(contacts);
+        let instances = instances.flatten().copied().collect();
+        Arc::new(Self { options: *options, instances, still: still(system), contacts })
+    }
+
+    /// What it found.
+    pub fn contacts(&self) -> &Contacts {
+        &self.contacts
     }
 }
 
 impl Unmoved {
+    /// `None` as for [`Seen::unmoved`].
+    fn since(seen: &Arc<Detection>, system: &System) -> Option<Self> {
+        let still = still(system);
+        let is_seen = |(k, body): (usize, &Body)| {
+            // Nothing was detected between bodies that were still.
+            let was_still = seen.still[k] && !still[k];
+            let now = system.scene().instance(body.instance);
+            !was_still && now.is_ok_and(|now| is_same(now, &seen.instances[k]))
+        };
+        let bodies: Vec<bool> = system.bodies().iter().enumerate().map(is_seen).collect();
+        // Marks say of bodies, not of pairs, that nothing is to be detected.
+        let fits = bodies.contains(&true) && zip(&still, &bodies).all(|(still, seen)| *seen || !still);
+        fits.then(|| Self { bodies, still, seen: seen.clone() })
+    }
+
     /// Whether nothing has moved.
     pub fn is_all(&self) -> bool {
         !self.bodies.contains(&false)
     }
 
-    /// Of each body, whether it is as the last look saw it.
+    /// Of each body, whether the earlier detection saw it as it is now.
     pub fn bodies(&self) -> &[bool] {
         &self.bodies
     }
@@ -98,6 +111,30 @@ impl Unmoved {
     /// Of each body, whether the caller has marked it as still.
     pub fn still(&self) -> &[bool] {
         &self.still
+    }
+
+    /// The contacts of a scene of whose pairs with a body that has moved `found` are those.
+    pub fn with(&self, found: Contacts, system: &System) -> Contacts {
+        // A detector may ignore marks.
+        let is_found = |a: InstanceId, b: InstanceId| !are(&self.bodies, [a, b], system);
+        let is_seen = |a: InstanceId, b: InstanceId| !is_found(a, b) && !are(&self.still, [a, b], system);
+        let world = |id| system.scene().instance(id).map_or(0, |instance| instance.world);
+        let key = |a: InstanceId, b: InstanceId| (world(a), a.min(b), a.max(b));
+        let of_pairs = |contacts| pairs(contacts).map(|(run, [a, b])| (key(a, b), run, [a, b]));
+        let mut runs: Vec<_> = of_pairs(found.as_slice()).filter(|(.., [a, b])| is_found(*a, *b)).collect();
+        runs.extend(of_pairs(self.seen.contacts.as_slice()).filter(|(.., [a, b])| is_seen(*a, *b)));
+        runs.sort_by_key(|(key, ..)| *key);
+        let mut contacts = Vec::with_capacity(found.len() + self.seen.contacts.len());
+        runs.iter().for_each(|(_, run, _)| contacts.extend_from_slice(run));
+        let Contacts { statistics, mut hidden, mut reductions, .. } = found;
+        hidden.retain(|h| is_found(h.instance_a, h.instance_b));
+        hidden.extend(self.seen.contacts.hidden.iter().filter(|h| is_seen(h.instance_a, h.instance_b)));
+        hidden.sort_by_key(|h| key(h.instance_a, h.instance_b));
+        reductions.retain(|r| is_found(r.instance_a, r.instance_b));
+        let of_seen = self.seen.contacts.reductions.iter();
+        reductions.extend(of_seen.filter(|r| is_seen(r.instance_a, r.instance_b)).copied());
+        reductions.sort_by_key(|r| key(r.instance_a, r.instance_b));
+        Contacts::new(contacts, statistics, reductions, hidden)
     }
 }
 
@@ -156,9 +193,18 @@ mod tests {
         ]
     "#;
 
+    /// Two boxes that are thrown at each other, and one that falls.
+    const THROWN: &str = r#"
+        bodies = [
+            { name = "a", shape = { box = { half_extents = [0.05, 0.04, 0.03] } }, mass = 1, translation = [-0.1, 0, 0], velocity = [8, 0, 0], angular_velocity = [0, 20, 30] },
+            { name = "b", shape = { box = { half_extents = [0.05, 0.04, 0.03] } }, mass = 1, translation = [0.1, 0.02, 0], velocity = [-8, 0, 0] },
+            { name = "c", shape = { sphere = { radius = 0.02 } }, mass = 1, translation = [0, 0, 0.5] },
+        ]
+    "#;
+
     /// An engine, and the numbers of its detections and of the instances that these looked at.
-    fn engine(sleep: f64) -> (Newton, Arc<[AtomicUsize; 2]>) {
-        let text = format!("time_step = 5e-3\nduration = 1\nsolver.sleep = {sleep:?}\n{BODIES}");
+    fn engine(sleep: f64, bodies: &str) -> (Newton, Arc<[AtomicUsize; 2]>) {
+        let text = format!("time_step = 5e-3\nduration = 1\nsolver.sleep = {sleep:?}\n{bodies}");
         let loaded = LoadedScene::parse(text, "scene.toml").unwrap();
         let counts = Arc::new([(); 2].map(|()| AtomicUsize::new(0)));
         let count = counts.clone();
@@ -188,7 +234,7 @@ mod tests {
     #[test]
     fn what_has_been_seen_is_what_a_new_detection_finds() {
         for sleep in [0.0, 0.1] {
-            let [(mut with, some), (mut without, all)] = [engine(sleep), engine(sleep)];
+            let [(mut with, some), (mut without, all)] = [(); 2].map(|()| engine(sleep, BODIES));
             for step in 0..250 {
                 without.seen = Seen::default();
                 let reports = [&mut with, &mut without].map(|engine| engine.step(5e-3).unwrap());
@@ -198,5 +244,15 @@ mod tests {
             let [some, all] = [some, all].map(|counts| counts.each_ref().map(|n| n.load(Ordering::Relaxed)));
             assert!(some[1] < all[1] && 2 * some[0] < 3 * all[0], "sleep {sleep}: {some:?} of {all:?}");
         }
+    }
+
+    /// Each body moves, so only what is predicted again is not looked at.
+    #[test]
+    fn poses_that_are_predicted_again_are_not_looked_at_again() {
+        let (mut engine, counts) = engine(0.0, THROWN);
+        let detections: u32 = (0..10).map(|_| engine.step(5e-3).unwrap().detections).sum();
+        let looks = counts[0].load(Ordering::Relaxed);
+        assert!(looks < detections as usize, "{looks} of {detections}");
+        assert!(engine.seen.later.is_empty() && engine.seen.first.is_some());
     }
 }

@@ -132,12 +132,12 @@ impl Newton {
                 }
                 // A step reports the overlaps at its beginning.
                 self.mark_resting(step);
-                let contacts = self.detect(step, &predicted, HiddenSearch::Off);
+                let detection = self.detect(step, &predicted, HiddenSearch::Off);
                 self.mark_still();
-                let contacts = contacts?;
+                let detection = detection?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 let rows_within = |step: &Step, reach: Reach<'_>, held: &[Row]| {
-                    let contacts = contacts.as_slice();
+                    let contacts = detection.contacts().as_slice();
                     let (mut next, far) =
                         self.gaps(step).predicted_rows(contacts, &poses, &seen, &beginning, &is_hit, reach);
                     next.retain(|row| !step.stays(row));
