@@ -184,18 +184,23 @@ impl Newton {
 
     /// The states after moving for one step at `velocities`. Their velocities are `velocities`.
     pub(super) fn moved(&self, step: &Step, velocities: &[Vector6<f64>]) -> Vec<State> {
+        self.moved_for(step, velocities, step.h)
+    }
+
+    /// The same, after moving for `time` seconds.
+    pub(super) fn moved_for(&self, step: &Step, velocities: &[Vector6<f64>], time: f64) -> Vec<State> {
         let mut states = self.system.states().to_vec();
         for (body, state) in self.system.bodies().iter().zip(&mut states) {
             // Without a velocity the pose stays bit for bit.
             if body.mass == Mass::Kinematic && state.has_velocity() {
-                state.pose = moved(DVec3::ZERO, state.pose, &velocity(state), step.h);
+                state.pose = moved(DVec3::ZERO, state.pose, &velocity(state), time);
             }
         }
         for (free, v) in step.free.iter().zip(velocities) {
             if let Mass::Free(mass) = self.system.bodies()[free.body].mass {
                 let (linear, angular) = unpack(v);
                 states[free.body] =
-                    State { pose: moved(mass.center, step.poses[free.body], v, step.h), linear, angular };
+                    State { pose: moved(mass.center, step.poses[free.body], v, time), linear, angular };
             }
         }
         states

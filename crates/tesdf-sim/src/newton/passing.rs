@@ -17,7 +17,7 @@ use tesdf::collide::{
 
 use super::Newton;
 use super::impacts::FAR;
-use super::integrate::unpack;
+use super::integrate::{unpack, velocity};
 use super::step::{Step, set_velocities};
 use crate::{Body, DynamicsError, Mass, State};
 
@@ -28,9 +28,12 @@ const DEPTH: f64 = 5e-4;
 /// Error of a depth, as part of the small depth.
 const EXACT: f64 = 0.1;
 
-/// Pairs that touch before this share of a part touch at its beginning: to divide there would be no
-/// use.
+/// Pairs that touch before this share of a part touch at its beginning, and those that touch after
+/// the rest of it at its end: to divide there would be of no use.
 const AT_ONCE: f64 = 0.02;
+
+/// Most looks at the depth of a pair that touches at the end.
+const MOST_DEPTHS: u32 = 64;
 
 /// Bodies that touch at the beginning may turn a little more than those that a step begins with.
 const TURNS: f64 = 1.5 * MOST_TURN;
@@ -63,8 +66,16 @@ enum Course {
     Free,
     /// It touches at the beginning, at this depth, m.
     Touching(f64),
-    /// It touches later, and the part is to be divided at this time, s.
-    Hit(f64),
+    /// It touches later.
+    Hit(Hit),
+}
+
+/// A pair that touches in a part, and not at its beginning.
+struct Hit {
+    /// When it touches, s.
+    touches: f64,
+    /// When the part is to be divided, s.
+    divides: f64,
 }
 
 impl Newton {
@@ -81,12 +92,19 @@ impl Newton {
         let pairs = self.fast_pairs(step, moved)?;
         step.report.followed += pairs.len() as u32;
         let mut touching: Vec<(Fast, f64)> = Vec::new();
-        let mut hits: Vec<f64> = Vec::new();
+        let mut hits: Vec<(Fast, Hit)> = Vec::new();
         for pair in pairs {
             match self.course(step, &pair, moved) {
                 Course::Free => {}
                 Course::Touching(depth) => touching.push((pair, depth)),
-                Course::Hit(time) => hits.push(time),
+                Course::Hit(hit) => hits.push((pair, hit)),
+            }
+        }
+        let mut divides: Vec<f64> = Vec::new();
+        for (pair, hit) in hits {
+            let is_late = hit.touches > (1.0 - AT_ONCE) * step.h;
+            if !is_late || !self.stays_shallow(step, &pair, hit.touches, moved)? {
+                divides.push(hit.divides);
             }
         }
         if !touching.is_empty() {
@@ -94,13 +112,13 @@ impl Newton {
         }
         let is_lost = |(pair, before): &&(Fast, f64)| {
             let small = DEPTH * pair.size;
-            self.turns(step, pair, moved) || self.depth(pair) > small.max(before + EXACT * small)
+            self.turns(step, pair, moved) || self.depth(pair, EXACT) > small.max(before + EXACT * small)
         };
         let lost = touching.iter().filter(is_lost).count();
         // Half of the part has still to be solved where that is less.
         let half = if lost > 0 { 0.5 * step.h } else { step.h };
-        let hit = hits.iter().copied().reduce(f64::min).filter(|hit| *hit < half);
-        let pairs = (lost + hits.len()) as u32;
+        let hit = divides.iter().copied().reduce(f64::min).filter(|hit| *hit < half);
+        let pairs = (lost + divides.len()) as u32;
         Ok((pairs > 0).then_some(Passing { hit, pairs }))
     }
 
@@ -189,8 +207,9 @@ impl Newton {
             let (linear, angular) = velocity.unwrap_or((moved[body].linear, moved[body].angular));
             self.motion(body, &State { linear, angular, ..moved[body] })
         });
-        let hit = self.touch(pair, free, 2.0 * skin, step.h).map_or(touches, |(time, _)| time);
-        if hit < AT_ONCE * step.h { Course::Touching(0.0) } else { Course::Hit(hit) }
+        let divides = self.touch(pair, free, 2.0 * skin, step.h).map_or(touches, |(time, _)| time);
+        let is_at_once = divides < AT_ONCE * step.h;
+        if is_at_once { Course::Touching(0.0) } else { Course::Hit(Hit { touches, divides }) }
     }
 
     /// The time at which a pair touches or is no longer known to be free, and the clearance then;
@@ -204,6 +223,32 @@ impl Newton {
             // Of a plane that turns nothing is known.
             Err(_) => Some((0.0, 0.0)),
         }
+    }
+
+    /// Whether a pair that is free until `time` is never deeper than twice the small depth, and ends
+    /// at most [`EXACT`] of it deep.
+    fn stays_shallow(
+        &mut self,
+        step: &Step,
+        pair: &Fast,
+        mut time: f64,
+        moved: &[State],
+    ) -> Result<bool, DynamicsError> {
+        let velocities: Vec<_> = step.free.iter().map(|free| velocity(&moved[free.body])).collect();
+        let (small, mut depth) = (DEPTH * pair.size, 0.0);
+        for _ in 0..MOST_DEPTHS {
+            // The depth changes by at most `2 way` in the duration of the part.
+            time = step.h.min(time + step.h * (3.0 * small - depth) / (2.0 * pair.way));
+            self.system.scene_at(&self.moved_for(step, &velocities, time))?;
+            if time >= step.h {
+                return Ok(self.depth(pair, EXACT * EXACT) <= EXACT * small);
+            }
+            depth = self.depth(pair, EXACT);
+            if depth > small {
+                return Ok(false);
+            }
+        }
+        Ok(false)
     }
 
     /// The motion of a body in a part of a step, at the velocities of `state`.
@@ -227,9 +272,10 @@ impl Newton {
         })
     }
 
-    /// How deep a pair is, m, where the scene is. As deep as can be if that is not known.
-    fn depth(&self, pair: &Fast) -> f64 {
-        let options = ClearanceOptions { tolerance: Length::Absolute(EXACT * DEPTH * pair.size) };
+    /// How deep a pair is, m, where the scene is, up to this share of the small depth. As deep as can
+    /// be if that is not known.
+    fn depth(&self, pair: &Fast, error: f64) -> f64 {
+        let options = ClearanceOptions { tolerance: Length::Absolute(error * DEPTH * pair.size) };
         let [a, b] = pair.ids;
         clearance(self.system.scene(), a, b, &options).map_or(f64::INFINITY, |found| -found.lower_bound)
     }
