@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use crate::geometry::{Feature, Triangle};
 
-/// A distance is at most this share of it more than the least one.
+/// A distance is more than the least one by at most this share of what it exceeds the radius by.
 pub const RELATIVE_ERROR: f64 = 1e-3;
 
 /// Number of support points after which the search stops. Nearly all take less than 20.

@@ -141,7 +141,8 @@ impl TimeOfImpact {
 /// account how fast they come nearer perpendicular to the plane, not along it. So surfaces that
 /// slide past each other at a small gap take few steps. It is conservative advancement (Mirtich
 /// 1996; with face trees, Tang, Kim and Manocha 2009), for each pair of parts. Nothing is sampled,
-/// so thin or fast bodies cannot pass through each other. Simple shapes are one part. Proof: `docs/math.md`, section 17.
+/// so thin or fast bodies cannot pass through each other. Simple shapes are one part. Proof:
+/// `docs/math.md`, section 17.
 ///
 /// The velocities of the instances are not used; pass them as [`Motion::Linear`].
 ///
@@ -173,8 +174,8 @@ impl TimeOfImpact {
 /// ```
 ///
 /// # Errors
-/// As [`clearance`](crate::collide::clearance()); also for a motion that is not finite, a rotating plane, or
-/// an invalid option.
+/// As [`clearance`](crate::collide::clearance()); also for a motion that is not finite, a rotating
+/// plane, or an invalid option.
 pub fn time_of_impact(
     scene: &Scene,
     a: InstanceId,
