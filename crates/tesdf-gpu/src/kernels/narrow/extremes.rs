@@ -101,7 +101,7 @@ struct Patch {
     opposes: f32,
     /// The depth of the minimum, to which other points are moved inwards; 0 where none are.
     depth: f32,
-    /// Faces of the other body are looked at up to this distance.
+    /// Faces of the other body that are nearest to a point of the patch are within this.
     near: f32,
 }
 
@@ -232,10 +232,12 @@ impl Facing<'_> {
         let is_large = self.is_large();
         let v = minimum.value;
         let mut level = 0u32;
+        let mut radius = 0.0f32;
         let mut k = 0u32;
         while k < self.part.count {
-            let height = v.gradient.dot(self.part.corner(k) - minimum.point);
-            level += select(height.abs() <= self.limits.tolerance, 1u32, 0u32);
+            let way = self.part.corner(k) - minimum.point;
+            level += select(v.gradient.dot(way).abs() <= self.limits.tolerance, 1u32, 0u32);
+            radius = radius.max(way.length());
             k += 1u32;
         }
         let own = select(minimum.corner == NO_CORNER, 0u32, 1u32);
@@ -246,7 +248,7 @@ impl Facing<'_> {
             limit: select(is_flat, limit, -FAR),
             opposes: select(self.has_plane(), OPPOSES, 2.0f32),
             depth: select(opposes, -v.distance, 0.0f32).max(0.0f32),
-            near: limit.abs().max(v.distance.abs()),
+            near: limit.abs().min(v.distance + radius).max(v.distance.abs()),
         }
     }
 

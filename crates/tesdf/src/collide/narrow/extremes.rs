@@ -408,8 +408,7 @@ impl<'a> Patch<'a> {
         let mut offer = |point| candidates.push(Candidate { point, corner: None, taken });
         match *self.field {
             CellField::Whole(around) => {
-                // Faces of the patch are as near as its points.
-                let limit = self.limit.abs().max(self.minimum.value.distance.abs());
+                let limit = self.nearest_within();
                 around.near_polygon(&self.within, self.normal, limit, &mut |face| {
                     self.overlay(&around.asset.local_triangle(face as usize), limit + HEIGHT, &mut offer);
                     limit
@@ -434,6 +433,14 @@ impl<'a> Patch<'a> {
                 }
             }
         }
+    }
+
+    /// Faces of the other body that are nearest to a point of the patch are within this. No point is
+    /// farther from the surface than the minimum by more than its distance from there.
+    fn nearest_within(&self) -> f64 {
+        let Minimum { point, value, .. } = self.minimum;
+        let radius = self.within.iter().map(|p| p.distance(*point)).fold(0.0, f64::max);
+        self.limit.abs().min(value.distance + radius).max(value.distance.abs())
     }
 
     /// Offers the corners of the overlay of the part and a face of the other body, as far as the
