@@ -17,7 +17,8 @@ if [ "$(cargo llvm-cov --version 2>/dev/null)" != "cargo-llvm-cov $version" ]; t
 fi
 
 report=$PWD/target/coverage.json
-[ $# -gt 0 ] || set -- -p tesdf --lib --test it
+# The nightly compiler puts the examples where the tests of them do not look.
+[ $# -gt 0 ] || set -- -p tesdf --lib --test it -- --skip examples::
 # Optimised, and without checks that a debug build adds: these have branches that no test may take.
 step "coverage" cargo "+$nightly" llvm-cov --branch --profile quick --json --output-path "$report" "$@"
 python3 .ci/coverage.py "$report" tesdf/geometry tesdf/encode tesdf/asset tesdf/query
