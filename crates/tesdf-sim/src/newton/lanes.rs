@@ -1,6 +1,6 @@
 //! Numbers of four rows at once. The compiler makes vector instructions of plain loops, and the
-//! bits are the same with and without them: nothing is fused, and sums have one order.
-use std::array;
+//! bits are the same with and without them: nothing is fused, and sums have one order. Rows are written
+//! out: `array::map` and `array::from_fn` are inlined in none but the most optimised builds.
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Number of rows.
@@ -21,12 +21,14 @@ impl Lanes {
 
     #[inline(always)]
     pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        Self(self.0.map(f))
+        let [a, b, c, d] = self.0;
+        Self([f(a), f(b), f(c), f(d)])
     }
 
     #[inline(always)]
     pub fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(array::from_fn(|k| f(self.0[k], other.0[k])))
+        let ([a, b, c, d], [w, x, y, z]) = (self.0, other.0);
+        Self([f(a, w), f(b, x), f(c, y), f(d, z)])
     }
 
     /// The greater ones; those of `self` where a number is NaN.
@@ -52,6 +54,12 @@ impl Lanes {
     pub fn least(self) -> f64 {
         self.0.into_iter().fold(f64::INFINITY, f64::min)
     }
+}
+
+/// A value for each bound or tangent.
+#[inline(always)]
+pub fn two<T>(f: impl Fn(usize) -> T) -> [T; 2] {
+    [f(0), f(1)]
 }
 
 macro_rules! operator {

@@ -6,7 +6,7 @@ use super::state::{State, bounded};
 use super::sum::Sum;
 use super::{Effort, Interior, Limits, Solution, WIDTHS};
 use crate::Residual;
-use crate::newton::lanes::{Lanes, WIDTH};
+use crate::newton::lanes::{Lanes, WIDTH, two};
 use crate::newton::line::{Bundle, Forces, Slips, dot};
 use crate::newton::linear::{BlockMatrix, Factor};
 
@@ -231,10 +231,11 @@ impl<'a> Iterate<'a> {
                 let (bundle, state) = (&lines.bundles[k], &mut self.states[k]);
                 let local = Local::new(bundle, state, push, &relative, limits, k, self.centre, width);
                 if bundle.slip.is_some() {
-                    state.friction = local.slip.share.map(|share| -(local.slip.limit * share));
+                    state.friction = two(|k| -(local.slip.limit * local.slip.share[k]));
                 }
                 bundle.act(state.force, state.friction, &mut acting);
-                let away = state.products().map(|product| -product);
+                let products = state.products();
+                let away = two(|k| -products[k]);
                 let followed = (of != k).then(|| self.standing[of].push);
                 let standing = local.standing(bundle, state, &away, self.least, followed, is_coulomb);
                 bundle.act(standing.push, standing.added(state), &mut change);
@@ -242,7 +243,7 @@ impl<'a> Iterate<'a> {
                     (Some(slip), true) => {
                         let stiffness = if of == k { local.stiffness } else { self.locals[of].stiffness };
                         let follows = -(slip.coefficient * stiffness);
-                        local.slip.along.map(|along| follows * along)
+                        two(|k| follows * local.slip.along[k])
                     }
                     _ => [Lanes::ZERO; 2],
                 };
@@ -404,7 +405,7 @@ impl<'a> Iterate<'a> {
             // That which limits torsional friction has gone along before.
             let limit = limits.of(k, slip, self.states[self.of.lines.pushing(k)].force);
             let state = &mut self.states[k];
-            let [x, y] = [0, 1].map(|k| state.friction[k] + (change.friction[k] - state.friction[k]) * step);
+            let [x, y] = two(|k| state.friction[k] + (change.friction[k] - state.friction[k]) * step);
             let size = (x * x + y * y).sqrt();
             let share = limit.zip(size, |limit, size| if size > limit { limit / size } else { 1.0 });
             state.friction = [x * share, y * share];
@@ -519,7 +520,7 @@ impl Local {
         width: f64,
     ) -> Self {
         // Where a bound is infinite, the slack is zero and the room infinite.
-        let [low, high] = [0, 1].map(|k| state.slack[k] / state.room[k]);
+        let [low, high] = two(|k| state.slack[k] / state.room[k]);
         let softness = (bundle.compliance + low + high).zip(low + high, |softness, bounds| {
             if bounds == 0.0 { softness.max(PROXIMAL) } else { softness }
         });
@@ -533,10 +534,10 @@ impl Local {
             let least = (slip.scale * width).max(limit * bundle.compliance * 0.5);
             let width = (Lanes::splat(centre) / limit).max(least);
             let length = (width * width + u[0] * u[0] + u[1] * u[1]).sqrt();
-            let along = u.map(|u| u / length);
+            let along = two(|k| u[k] / length);
             let [x, y] = state.friction;
             let size = (x * x + y * y).sqrt().max(limit);
-            let share = state.friction.map(|friction| -(friction / size));
+            let share = two(|k| -(state.friction[k] / size));
             let k = limit / (width + length);
             let one = Lanes::splat(1.0);
             let stiffness = [
@@ -561,7 +562,7 @@ impl Local {
         followed: Option<Lanes>,
         is_coulomb: bool,
     ) -> Standing {
-        let [low, high] = [0, 1].map(|k| products[k] / state.room[k]);
+        let [low, high] = two(|k| products[k] / state.room[k]);
         let push = self.stiffness * (low - high - self.residual);
         let friction = bundle.slip.as_ref().map_or([Lanes::ZERO; 2], |slip| {
             let at = &self.slip;
@@ -569,7 +570,7 @@ impl Local {
             let [k, wider] = [at.limit / (at.width + at.length), at.limit * wider / at.length];
             let push = followed.unwrap_or(push);
             let follows = if is_coulomb { slip.coefficient * push } else { Lanes::ZERO };
-            [0, 1].map(|i| wider * at.share[i] - k * at.slip[i] - follows * at.along[i])
+            two(|i| wider * at.share[i] - k * at.slip[i] - follows * at.along[i])
         });
         Standing { push, friction }
     }
@@ -579,6 +580,6 @@ impl Standing {
     /// The change of the friction.
     #[inline(always)]
     fn added(&self, state: &State) -> [Lanes; 2] {
-        [0, 1].map(|k| self.friction[k] - state.friction[k])
+        two(|k| self.friction[k] - state.friction[k])
     }
 }

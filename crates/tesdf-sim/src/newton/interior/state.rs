@@ -1,6 +1,6 @@
 //! Forces of rows within their bounds, on the central path of the interior point method: room ×
 //! slack = ν for each bound.
-use crate::newton::lanes::{Lanes, WIDTH};
+use crate::newton::lanes::{Lanes, WIDTH, two};
 use crate::newton::line::{Bundle, Forces};
 
 /// The place between two bounds is found in so many rounds: exactly where ν is small, and near enough
@@ -73,7 +73,7 @@ impl State {
     /// Room × slack of each bound; zero without a bound.
     #[inline(always)]
     pub fn products(&self) -> [Lanes; 2] {
-        [0, 1].map(|k| bounded(self.room[k], self.room[k] * self.slack[k]))
+        two(|k| bounded(self.room[k], self.room[k] * self.slack[k]))
     }
 
     /// The forces that are reported. An open contact has none.
