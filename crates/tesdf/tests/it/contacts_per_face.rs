@@ -1,7 +1,7 @@
 //! Contacts per face against contacts per cell, and flat contact between bodies that rest on each
 //! other.
 
-use crate::support::bodies::{Placed, RELATIONS, Relation, scene};
+use crate::support::bodies::{Placed, RELATIONS, Relation, of_direction, scene};
 use crate::support::per_face::{Detection, block};
 use crate::support::random::Random;
 use crate::support::rotation::{least, of_the_day};
@@ -158,4 +158,29 @@ fn faces_that_nodes_miss_are_named() {
     assert!(on(1, 0.101).1.is_empty());
     let (contacts, coarse) = on(24, 0.1);
     assert!(contacts > 0 && coarse.is_empty(), "{coarse:?}");
+}
+
+/// Where a large face touches, all corners of what lies on it are found, however far from where it is
+/// nearest or deepest.
+#[test]
+fn a_large_face_has_the_corners_of_what_leans_on_it_or_sank_into_it() {
+    const SIDE: f64 = 0.1;
+    for (sunk, tilt) in [(0.0, 0.0), (0.0, 4e-4), (0.0, -4e-4), (1e-3, 0.0), (0.02, 0.0)] {
+        let plate = block(DVec3::new(-0.5, -0.5, -0.1), DVec3::new(0.5, 0.5, 0.0), 1);
+        let mut box_of_16 = block(DVec3::splat(-SIDE), DVec3::splat(SIDE), 16);
+        let rotation = DQuat::from_rotation_y(tilt);
+        box_of_16.at.pose =
+            Pose { translation: DVec3::new(0.013, 0.027, SIDE * (1.0 + tilt.abs()) - sunk), rotation };
+        let pose = box_of_16.at.pose;
+        let scene = scene(&[plate, box_of_16]);
+        let options = CollideOptions { contact_distance: 1e-4, ..CollideOptions::with_mode(Mode::exact()) };
+        let contacts = detect(&scene, &options);
+        for corner in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+            let corner = pose.to_world(SIDE * DVec3::new(corner[0], corner[1], -1.0));
+            let of_plate = of_direction(contacts.as_slice(), 0, 1);
+            let nearest = of_plate.map(|c| c.point_a.distance(corner)).fold(f64::INFINITY, f64::min);
+            // Beside the corner of a box that sank, its other sides are nearer.
+            assert!(nearest < 1e-4 + 2.0 * sunk, "{sunk} m, {tilt} rad: {nearest} m from {corner}");
+        }
+    }
 }
