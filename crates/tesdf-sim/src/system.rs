@@ -479,10 +479,19 @@ impl System {
     /// # Errors
     /// The same errors as [`Scene::update`].
     pub fn scene_at(&mut self, states: &[State]) -> Result<&Scene, CollideError> {
-        let mut updates = Vec::with_capacity(states.len());
-        for (body, state) in self.bodies.iter().zip(states) {
+        self.scene_with(states.iter().copied().enumerate())
+    }
+
+    /// The scene with these bodies in these states, and the others as they were in it.
+    pub(crate) fn scene_with(
+        &mut self,
+        states: impl IntoIterator<Item = (usize, State)>,
+    ) -> Result<&Scene, CollideError> {
+        let mut updates = Vec::with_capacity(self.bodies.len());
+        for (body, state) in states {
+            let body = &self.bodies[body];
             let before = *self.scene.instance(body.instance)?;
-            let velocity = Self::velocity_of_origin(body, state);
+            let velocity = Self::velocity_of_origin(body, &state);
             updates.push((body.instance, Instance { pose: state.pose, velocity, ..before }));
         }
         self.scene.update(&updates)?;

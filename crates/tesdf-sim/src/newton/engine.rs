@@ -4,7 +4,7 @@ use glam::DVec3;
 use nalgebra::Vector6;
 use tesdf::collide::internal::Ahead;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Shape, Velocity,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Pose, Shape, Velocity,
     instance_pairs,
 };
 
@@ -17,7 +17,7 @@ use super::look::Look;
 use super::passing::{MOST_TURN, Passing};
 use super::rotation::Rotation;
 use super::rows::FreeBody;
-use super::seen::{Detection, Seen};
+use super::seen::{Detection, Seen, Unmoved};
 use super::sleep::Sleep;
 use super::step::{Step, set_velocities};
 use super::stopwatch::Stopwatch;
@@ -152,7 +152,7 @@ impl Newton {
         Ok(())
     }
 
-    fn begin(&self, h: f64, whole: f64) -> Step {
+    pub(super) fn begin(&self, h: f64, whole: f64) -> Step {
         let states = self.system.states();
         let mut free_of = vec![None; states.len()];
         let (mut free, mut target, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
@@ -190,20 +190,29 @@ impl Newton {
     /// The same, after moving for `time` seconds.
     pub(super) fn moved_for(&self, step: &Step, velocities: &[Vector6<f64>], time: f64) -> Vec<State> {
         let mut states = self.system.states().to_vec();
-        for (body, state) in self.system.bodies().iter().zip(&mut states) {
-            // Without a velocity the pose stays bit for bit.
-            if body.mass == Mass::Kinematic && state.has_velocity() {
-                state.pose = moved(DVec3::ZERO, state.pose, &velocity(state), time);
+        for (body, state) in states.iter_mut().enumerate() {
+            if self.system.bodies()[body].mass == Mass::Kinematic {
+                state.pose = self.pose_after(step, body, &velocity(state), time);
             }
         }
         for (free, v) in step.free.iter().zip(velocities) {
-            if let Mass::Free(mass) = self.system.bodies()[free.body].mass {
-                let (linear, angular) = unpack(v);
-                states[free.body] =
-                    State { pose: moved(mass.center, step.poses[free.body], v, time), linear, angular };
-            }
+            let (linear, angular) = unpack(v);
+            let pose = self.pose_after(step, free.body, v, time);
+            states[free.body] = State { pose, linear, angular };
         }
         states
+    }
+
+    /// The pose of a body that has moved at a velocity for a time, s, since the part began.
+    pub(super) fn pose_after(&self, step: &Step, body: usize, v: &Vector6<f64>, time: f64) -> Pose {
+        let begin = step.poses[body];
+        match self.system.bodies()[body].mass {
+            Mass::Fixed => begin,
+            // Without a velocity the pose stays bit for bit.
+            Mass::Kinematic if *v == Vector6::zeros() => begin,
+            Mass::Kinematic => moved(DVec3::ZERO, begin, v, time),
+            Mass::Free(mass) => moved(mass.center, begin, v, time),
+        }
     }
 
     /// The options of a detection. Within a step, gravity acts on one body of a pair while contacts
@@ -225,26 +234,38 @@ impl Newton {
         let start = Stopwatch::start();
         let options = CollideOptions { hidden, ..self.options_of(step.h) };
         self.system.scene_at(states)?;
-        let contacts = match self.seen.unmoved(&self.system, &options) {
-            None => self.detector.detect(self.system.scene(), &options)?,
-            Some(unmoved) => {
-                let found = match unmoved.is_all() {
-                    true => Contacts::default(),
-                    false => {
-                        self.mark(unmoved.bodies());
-                        let found = self.detector.detect(self.system.scene(), &options);
-                        self.mark(unmoved.still());
-                        found?
-                    }
-                };
-                unmoved.with(found, &self.system)
+        let unmoved = self.seen.unmoved(&self.system, &options);
+        let detection = match unmoved.as_ref().and_then(Unmoved::whole) {
+            Some(same) => same,
+            None => {
+                let contacts = self.detect_moved(unmoved, &options)?;
+                let detection = Detection::new(&self.system, &options, contacts);
+                self.seen.add(detection.clone());
+                detection
             }
         };
         step.report.detections += 1;
         step.report.detection += start.elapsed();
-        let detection = Detection::new(&self.system, &options, contacts);
-        self.seen.add(detection.clone());
         Ok(detection)
+    }
+
+    /// What is detected in the scene, of which the detector looks only at what has moved.
+    fn detect_moved(
+        &mut self,
+        unmoved: Option<Unmoved>,
+        options: &CollideOptions,
+    ) -> Result<Contacts, DynamicsError> {
+        let Some(unmoved) = unmoved else { return Ok(self.detector.detect(self.system.scene(), options)?) };
+        let found = match unmoved.is_all() {
+            true => Contacts::default(),
+            false => {
+                self.mark(unmoved.bodies());
+                let found = self.detector.detect(self.system.scene(), options);
+                self.mark(unmoved.still());
+                found?
+            }
+        };
+        Ok(unmoved.with(found, &self.system))
     }
 
     pub(super) fn gaps<'a>(&'a self, step: &'a Step) -> Gaps<'a> {

@@ -234,12 +234,15 @@ impl Newton {
         mut time: f64,
         moved: &[State],
     ) -> Result<bool, DynamicsError> {
-        let velocities: Vec<_> = step.free.iter().map(|free| velocity(&moved[free.body])).collect();
         let (small, mut depth) = (DEPTH * pair.size, 0.0);
         for _ in 0..MOST_DEPTHS {
             // The depth changes by at most `2 way` in the duration of the part.
             time = step.h.min(time + step.h * (3.0 * small - depth) / (2.0 * pair.way));
-            self.system.scene_at(&self.moved_for(step, &velocities, time))?;
+            let then = pair.bodies.map(|body| {
+                let pose = self.pose_after(step, body, &velocity(&moved[body]), time);
+                (body, State { pose, ..moved[body] })
+            });
+            self.system.scene_with(then)?;
             if time >= step.h {
                 return Ok(self.depth(pair, EXACT * EXACT) <= EXACT * small);
             }
@@ -278,5 +281,68 @@ impl Newton {
         let options = ClearanceOptions { tolerance: Length::Absolute(error * DEPTH * pair.size) };
         let [a, b] = pair.ids;
         clearance(self.system.scene(), a, b, &options).map_or(f64::INFINITY, |found| -found.lower_bound)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector6;
+
+    use super::*;
+    use crate::newton::integrate::pack;
+    use crate::scene_file::LoadedScene;
+
+    /// The duration of a part, s, and the turn of the blade in it, rad.
+    const H: f64 = 5e-3;
+    const TURN: f64 = 2.6;
+    /// Half of the length and of the width of the blade, m.
+    const BLADE: [f64; 2] = [0.1, 0.02];
+
+    /// A blade that turns beside a wall, the part, and the states at its end. At the share `at` of the
+    /// part a corner of the blade is as deep in the wall as it comes: by `deep` of the small depth.
+    fn graze(at: f64, deep: f64) -> (Newton, Step, Vec<State>) {
+        let [length, width] = BLADE;
+        let (reach, corner) = (elementary::hypot(length, width), (width / length).atan());
+        let small = DEPTH * 2.0 * (length * length + 2.0 * width * width).sqrt();
+        let (wall, half_turn) = (0.5 + reach - deep * small, 0.5 * (-corner - at * TURN));
+        let [sin, cos] = [elementary::sin(half_turn), elementary::cos(half_turn)];
+        let text = format!(
+            "time_step = {H:?}\nduration = 1\n[[bodies]]\nname = \"wall\"\nfixed = true\n\
+             shape = {{ box = {{ half_extents = [0.5, 0.5, 0.5] }} }}\ntranslation = [{wall:?}, 0, 0]\n\
+             [[bodies]]\nname = \"blade\"\nmass = 1\nshape = {{ box = {{ half_extents = [{length:?}, {width:?}, \
+             {width:?}] }} }}\nrotation = [0, 0, {sin:?}, {cos:?}]\nangular_velocity = [0, 0, {:?}]\n",
+            TURN / H,
+        );
+        let loaded = LoadedScene::parse(text, "scene.toml").unwrap();
+        let engine = loaded.newton(loaded.system().unwrap()).unwrap();
+        let step = engine.begin(H, H);
+        let velocity: Vector6<f64> = pack(DVec3::ZERO, DVec3::new(0.0, 0.0, TURN / H));
+        let moved = engine.moved(&step, &[velocity]);
+        (engine, step, moved)
+    }
+
+    #[test]
+    fn a_pair_that_grazes_stays_shallow_and_one_that_goes_deep_or_ends_deep_does_not() {
+        let cases = [(0.985, 0.5, true), (0.985, 3.0, false), (1.0, 0.05, true), (1.0, 0.5, false)];
+        for (at, deep, expected) in cases {
+            let (mut engine, step, moved) = graze(at, deep);
+            let pair = engine.fast_pairs(&step, &moved).unwrap().remove(0);
+            let found = engine.stays_shallow(&step, &pair, (at - 0.015) * H, &moved).unwrap();
+            assert_eq!(found, expected, "{deep} of the small depth at {at} of the part");
+        }
+    }
+
+    #[test]
+    fn a_part_is_not_divided_where_a_pair_grazes_late() {
+        for (at, deep, passes) in [(0.991, 0.2, 0), (0.991, 3.0, 1), (0.6, 0.5, 1)] {
+            let (mut engine, mut step, moved) = graze(at, deep);
+            let passing = engine.passing(&mut step, &moved).unwrap();
+            assert_eq!(step.report.followed, 1);
+            assert_eq!(
+                passing.map_or(0, |passing| passing.pairs),
+                passes,
+                "{deep} of the small depth at {at}"
+            );
+        }
     }
 }

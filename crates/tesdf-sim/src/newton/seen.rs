@@ -13,12 +13,10 @@ use crate::{Body, System};
 
 /// What the first detection of a part of a step has found, and those that followed it. A part that
 /// is solved again, because bodies close faster than was foreseen, predicts most poses again.
+///
+/// Each is another one, so they are few.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// `None` before the first part.
-    first: Option<Arc<Detection>>,
-    later: Vec<Arc<Detection>>,
-}
+pub struct Seen(Vec<Arc<Detection>>);
 
 /// A detection.
 #[derive(Debug)]
@@ -46,25 +44,24 @@ impl Seen {
     /// one that saw most of them. `None` where there are none, or where marks cannot tell which they
     /// are.
     pub fn unmoved(&self, system: &System, options: &CollideOptions) -> Option<Unmoved> {
-        let same = self.first.iter().chain(&self.later).filter(|seen| seen.options == *options);
+        let same = self.0.iter().filter(|seen| seen.options == *options);
         let unmoved = same.filter_map(|seen| Unmoved::since(seen, system));
         unmoved.max_by_key(|unmoved| unmoved.bodies.iter().filter(|seen| **seen).count())
     }
 
     /// Keeps the first detection of a part, and forgets those before.
     pub fn begin(&mut self, first: Arc<Detection>) {
-        self.first = Some(first);
-        self.later.clear();
+        self.0 = vec![first];
     }
 
     /// Keeps another detection of the part.
     pub fn add(&mut self, detection: Arc<Detection>) {
-        self.later.push(detection);
+        self.0.push(detection);
     }
 
     /// Ends the step: of its detections, the first one of the last part is kept.
     pub fn end(&mut self) {
-        self.later.clear();
+        self.0.truncate(1);
     }
 }
 
@@ -101,6 +98,11 @@ impl Unmoved {
     /// Whether nothing has moved.
     pub fn is_all(&self) -> bool {
         !self.bodies.contains(&false)
+    }
+
+    /// The earlier detection, where a new one would be the same.
+    pub fn whole(&self) -> Option<Arc<Detection>> {
+        (self.is_all() && self.still == self.seen.still).then(|| self.seen.clone())
     }
 
     /// Of each body, whether the earlier detection saw it as it is now.
@@ -253,6 +255,6 @@ mod tests {
         let detections: u32 = (0..10).map(|_| engine.step(5e-3).unwrap().detections).sum();
         let looks = counts[0].load(Ordering::Relaxed);
         assert!(looks < detections as usize, "{looks} of {detections}");
-        assert!(engine.seen.later.is_empty() && engine.seen.first.is_some());
+        assert_eq!(engine.seen.0.len(), 1);
     }
 }
