@@ -245,3 +245,69 @@ impl Writer<'_> {
         Ok(offset as u32 + prefix)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Chains;
+
+    fn listed(faces: Vec<u32>) -> Tree {
+        Tree::Leaf(Leaf::Listed { faces, crossing: false, chains: Chains::NONE })
+    }
+
+    /// A tree of `count` lists of one face beside a list of all faces, which fits no palette. Each
+    /// of the short lists has a palette of its own.
+    fn with_palettes(count: usize) -> Tree {
+        let all = listed((0..PALETTE_SIZE as u32).collect());
+        (0..count).fold(all, |tree, at| Tree::Split(Box::new([listed(vec![at as u32 % 7]), tree])))
+    }
+
+    fn assembled(mut trees: Vec<Tree>, leaves: usize) -> Result<Forest, EncodeError> {
+        let position: Vec<u32> = (0..PALETTE_SIZE as u32).rev().collect();
+        let order: Vec<u32> = (0..trees.len() as u32).collect();
+        assemble(&mut trees, &vec![Label::Outside; leaves], &position, &order)
+    }
+
+    #[test]
+    fn more_palettes_than_a_list_can_name_are_an_error() {
+        // Number 65535 says that a list has no palette.
+        let trees = |rest| (0..255).map(|_| with_palettes(256)).chain([with_palettes(rest)]).collect();
+        let forest = assembled(trees(254), 256 + 255 * 256 + 254).expect("as many as can be named");
+        assert_eq!(forest.palette_starts.len(), 255 * 256 + 254 + 1);
+        let last = forest.palette(u16::MAX - 2);
+        assert_eq!(last, [255 - 253 % 7]);
+        match assembled(trees(255), 256 + 255 * 256 + 255) {
+            Err(EncodeError::TooLarge { what: "palettes", found, limit: 65535 }) => assert_eq!(found, 65536),
+            other => panic!("{:?}", other.map(|forest| forest.palette_starts.len())),
+        }
+    }
+
+    #[test]
+    fn lists_name_their_faces_by_place_and_equal_lists_are_stored_once() {
+        let all: Vec<u32> = (0..PALETTE_SIZE as u32).collect();
+        let lists = [vec![3, 9], vec![200], vec![3, 9], all, vec![3, 9]];
+        let forest = assembled(lists.iter().cloned().map(listed).collect(), lists.len()).expect("few");
+        let offsets: Vec<u32> = forest
+            .nodes
+            .iter()
+            .map(|&word| match Node::decode(word, &forest.lists) {
+                Node::Listed(Label::Outside, offset) => offset,
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert!(offsets[0] == offsets[2] && offsets[0] == offsets[4], "{offsets:?}");
+        for (faces, offset) in lists.iter().zip(offsets) {
+            let mut expected: Vec<u32> = faces.iter().map(|f| 255 - f).collect();
+            expected.sort_unstable();
+            let found: Vec<u32> = match List::decode(&forest.lists, offset).expect("a list") {
+                List::Slots(palette, slots) => {
+                    slots.iter().map(|&slot| forest.palette(palette)[slot as usize]).collect()
+                }
+                List::Faces(bytes) => {
+                    bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+                }
+            };
+            assert_eq!(found, expected);
+        }
+    }
+}

@@ -436,4 +436,24 @@ mod tests {
         }
         Ok(())
     }
+
+    /// The rows of a pool still have the shapes of the faces before.
+    #[test]
+    fn no_candidates_have_no_nearest_face_whatever_the_pool_had_before() {
+        let needle = vec![DVec3::ZERO, DVec3::X, DVec3::new(0.5, 1e-7, 0.0)];
+        let mesh = TriangleMesh::new(needle, vec![[0, 1, 2]]).expect("valid ids");
+        let mut surface = Surface::new(&mesh, 1.0, Touching::Kept);
+        assert!(surface.triangles[0].is_needle());
+        let over = DVec3::new(0.5, 5e-8, 0.25);
+        let cell = Cell { corners: [over, over + DVec3::X, over + DVec3::Y, over + DVec3::Z], depth: 0 };
+        for &isa in Isa::of_processor() {
+            surface.isa = isa;
+            let mut pool = Pool::new(&surface, &[0], &cell);
+            assert!((pool.candidates().nearest[0].distance - 0.25).abs() < 1e-12, "{isa:?}");
+            pool.fill(&surface, &[], &cell);
+            let candidates = pool.candidates();
+            assert!(candidates.faces.is_empty());
+            assert!(candidates.nearest.iter().all(|nearest| nearest.distance == f64::INFINITY), "{isa:?}");
+        }
+    }
 }

@@ -117,12 +117,10 @@ pub fn filter(
     let distances = candidates.seen.map(|rows| &rows[..candidates.stride]);
     let centroid = &scratch.centroid[..candidates.stride];
     point_rule(surface.isa, distances, &reach, centroid, radius + PAD, &mut scratch.alive, &mut scratch.near);
-    if !n.is_multiple_of(GROUP)
-        && let (Some(alive), Some(near)) = (scratch.alive.last_mut(), scratch.near.last_mut())
-    {
+    if !n.is_multiple_of(GROUP) {
         let used = (1 << (n % GROUP)) - 1;
-        *alive &= used;
-        *near &= used;
+        let last = scratch.alive.last_mut().into_iter().chain(scratch.near.last_mut());
+        last.for_each(|members| *members &= used);
     }
 
     if surface.touching == Touching::Ignored {

@@ -204,3 +204,28 @@ fn faces_behind_another_are_kept_where_they_meet_the_cell() {
         }
     }
 }
+
+/// Tetrahedra of a conforming domain may be as flat as rounding allows.
+#[test]
+fn a_cell_without_thickness_keeps_the_face_that_it_lies_on() {
+    let vertices = [[0.0, 0.0], [0.6, 0.0], [0.0, 0.6], [0.6, 0.6]].map(|[x, y]| DVec3::new(x, y, 0.0));
+    // The first face twice, a face beside it, and one behind them.
+    let behind = vertices.map(|p| p - 0.1 * DVec3::Z);
+    let faces = vec![[0, 1, 2], [0, 1, 2], [1, 3, 2], [4, 5, 6]];
+    let mesh = TriangleMesh::new([vertices, behind].concat(), faces).expect("valid ids");
+    let flat = [[0.1, 0.1], [0.3, 0.1], [0.1, 0.3], [0.2, 0.2]].map(|[x, y]| DVec3::new(x, y, 0.0));
+    for thickness in [0.0, 1e-17, 1e-16] {
+        let mut corners = flat;
+        corners[3].z = thickness;
+        let cell = Cell { corners, depth: 0 };
+        let mut surface = Surface::new(&mesh, 1.0, Touching::Ignored);
+        for &isa in Isa::of_processor() {
+            surface.isa = isa;
+            let pool = Pool::new(&surface, &[0, 1, 2, 3], &cell);
+            let filtered = filter(&surface, &cell, &pool.candidates(), Chains::NONE, &mut Scratch::default());
+            let kept: Vec<u32> = filtered.survivors.iter().map(|survivor| survivor.index).collect();
+            assert!(kept.contains(&0) || kept.contains(&1), "{thickness:e} {isa:?}: {kept:?}");
+            assert!(!kept.contains(&3), "{thickness:e} {isa:?}: {kept:?}");
+        }
+    }
+}

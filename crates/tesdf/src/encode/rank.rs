@@ -117,3 +117,48 @@ impl Needs<'_> {
         scratch.give_back(pool);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::encode::surface::Touching;
+    use crate::mesh::TriangleMesh;
+
+    /// Small cells far from two faces between which they lie, and from a third one behind these.
+    #[test]
+    fn a_small_far_cell_needs_its_nearest_faces_from_its_distance_on_and_no_others() {
+        let at = |x: f64, z: f64| [[x, 0.0, z], [x, 0.1, z], [0.5 * x, 0.0, z - 0.1]].map(DVec3::from);
+        let faces = [at(-0.3, 0.0), at(0.3, 0.0), at(0.1, -1.0)];
+        let ids = vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]];
+        let mesh = TriangleMesh::new(faces.as_flattened().to_vec(), ids).expect("valid ids");
+        let surface = Surface::new(&mesh, 1.0, Touching::Kept);
+        let size = 0.02;
+        for height in [0.9, 1.2, 1.5] {
+            // Both faces are equally far from the middle of the cell, up to its size.
+            let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+            let corners = corners.map(|p| height * DVec3::Z + size * (p - DVec3::splat(0.25)));
+            let cell = Cell { corners, depth: 0 };
+            let (ranked, _) = rank(&surface, &cell, &[0, 1, 2], Chains::NONE, &mut Scratch::default());
+            assert_eq!(ranked.iter().map(|r| r.face).collect::<Vec<_>>(), [0, 1, 2]);
+            let mut least = [f64::INFINITY; 3];
+            let steps = || (0..=20).map(|k| f64::from(k) / 20.0);
+            for (u, v, w) in steps().flat_map(|u| steps().flat_map(move |v| steps().map(move |w| (u, v, w))))
+            {
+                if u + v + w > 1.0 {
+                    continue;
+                }
+                let p = corners[0] + size * DVec3::new(u, v, w);
+                let distances = [0, 1, 2].map(|f| surface.triangles[f].closest(p).distance);
+                let nearest = (0..3).min_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
+                least[nearest] = least[nearest].min(distances[nearest]);
+            }
+            for (found, least) in ranked.iter().map(|r| r.distance).zip(least) {
+                let is_tight = found == least || found > least - 2.0 * size;
+                assert!(found <= least && is_tight, "height {height}: {found}, needed from {least} on");
+            }
+            assert!(least[0].is_finite() && least[1].is_finite() && ranked[2].distance.is_infinite());
+        }
+    }
+}

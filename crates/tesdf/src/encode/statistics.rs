@@ -51,3 +51,44 @@ fn add(s: &mut Statistics, tree: &Tree, cell: Cell) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::base::Chains;
+    use crate::domain::DomainCube;
+    use crate::geometry::Aabb;
+
+    #[test]
+    fn lists_are_weighted_by_volume_and_no_lists_have_the_mean_0() {
+        let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
+        let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2]]).expect("valid ids");
+        let cube = DomainCube::around(Aabb { min: DVec3::ZERO, max: DVec3::ONE });
+        let cell = cube.root(0);
+        let volume = cell.volume();
+        // Lengths of the local frame are twice those of the mesh.
+        let frame = LocalFrame::new(DVec3::ZERO, 2.0);
+        let listed = |count: u32| {
+            let faces = (0..count).collect();
+            Tree::Leaf(Leaf::Listed { faces, crossing: false, chains: Chains::NONE })
+        };
+        let split = |a, b| Tree::Split(Box::new([a, b]));
+
+        let far = [Tree::Leaf(Leaf::Far), Tree::Leaf(Leaf::Outside)];
+        let found = statistics(&far, &[Label::Outside; 2], &[cell, cube.root(1)], &mesh, frame);
+        assert_eq!((found.far_cells, found.outside_cells, found.listed_cells), (1, 1, 0));
+        assert_eq!((found.domain_volume, found.far_volume), (volume / 8.0, volume / 8.0));
+        assert_eq!(found.volume_weighted_list, 0.0);
+
+        // A half of the cell, and two quarters of it.
+        let trees = [split(listed(4), split(listed(8), Tree::Leaf(Leaf::Far)))];
+        let labels = [Label::Crossing(0), Label::Inside, Label::Inside];
+        let found = statistics(&trees, &labels, &[cell], &mesh, frame);
+        assert_eq!((found.far_cells, found.listed_cells, found.crossing_cells), (1, 2, 1));
+        assert_eq!((found.entries, found.longest_list, found.faces, found.vertices), (12, 8, 1, 3));
+        let expected = (4.0 * 0.5 + 8.0 * 0.25) / 0.75;
+        assert!((found.volume_weighted_list - expected).abs() < 1e-12, "{found:?}");
+    }
+}

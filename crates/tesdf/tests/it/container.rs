@@ -190,6 +190,18 @@ fn wrong_sizes_in_the_header_name_the_section() {
         ),
         ("\"checksum\":", "\"chksum\":", "header: the checksum does not follow"),
         ("\"tesdf\"", "\"tesfd\"", "this is a safetensors file of another kind"),
+        ("\"planes\":", "\"points\":", "section points: it has two entries"),
+        (
+            "\"points\":{\"dtype\":\"F64\",\"shape\":[3,3],\"data_offsets\":[0,72]}",
+            "\"flags\":{\"dtype\":\"U8\",\"shape\":[3],\"data_offsets\":[0,3]},\
+             \"points\":{\"dtype\":\"F64\",\"shape\":[3,3],\"data_offsets\":[3,75]}",
+            "section points: data_offsets [3,75] are not aligned to 8 bytes",
+        ),
+        (
+            "\"points\":{",
+            "\"__metadata__\":{\"a\":\"b\"},\"points\":{",
+            "header: not the expected JSON: two entries __metadata__",
+        ),
     ];
     for (from, to, expected) in cases {
         let found = message(&edited(from, to));
@@ -209,16 +221,54 @@ fn wrong_sizes_in_the_header_name_the_section() {
 }
 
 #[test]
+fn a_header_has_at_most_1024_sections_and_as_many_metadata_keys() {
+    let empty = "\"x\":{\"dtype\":\"U8\",\"shape\":[0],\"data_offsets\":[0,0]},";
+    // The sample has five sections of its own.
+    for (count, expected) in [(1024 - 5, "section x: no section"), (1024 - 4, "more than 1024 sections")] {
+        let found = message(&edited("\"points\":{", &(empty.repeat(count) + "\"points\":{")));
+        assert!(found.contains(expected), "{count} sections: {found}");
+    }
+    // The sample has the format, the version, two keys of its own, and six checksums.
+    for (count, is_read) in [(1024 - 10, true), (1024 - 9, false)] {
+        let keys: String = (0..count).map(|k| format!("\"k{k}\":\"\",")).collect();
+        let bytes = edited("\"unit\":", &(keys + "\"unit\":"));
+        match open(&bytes) {
+            Ok(container) => assert!(is_read && container.metadata().len() == count + 2, "{count}"),
+            Err(e) => {
+                assert!(!is_read && e.to_string().contains("more than 1024 metadata keys"), "{count}: {e}")
+            }
+        }
+    }
+}
+
+#[test]
+fn errors_shorten_long_names_and_count_bytes_in_words() {
+    for (length, shown) in [(64, "x".repeat(64)), (65, "x".repeat(64) + "…")] {
+        let found = message(&edited("\"points\":", &format!("\"{}\":", "x".repeat(length))));
+        assert!(found.starts_with(&format!("section {shown}: no section")), "{length}: {found}");
+    }
+    for (extra, expected) in [(1, "1 byte follows the last section"), (2, "2 bytes follow the last section")]
+    {
+        let found = message(&[&sample()[..], &vec![0; extra]].concat());
+        assert!(found.starts_with(expected), "{found}");
+    }
+}
+
+#[test]
 fn other_formats_are_recognised() {
     let stl = [vec![0; 80], 1_u32.to_le_bytes().to_vec(), vec![0; 50]].concat();
     for (bytes, expected) in [
         (&stl[..], "an STL mesh"),
         (b"solid part\nfacet", "an STL mesh"),
         (b"ply\nformat ascii 1.0\n", "a PLY mesh"),
+        (b"ply\rformat ascii 1.0\r", "a PLY mesh"),
         (b"OFF\n3 1 0\n", "an OFF mesh"),
         (b"glTF\x02\0\0\0\0\0\0\0", "a GLB mesh"),
         (b"# made by\nv 0 0 0\n", "text, perhaps an OBJ mesh"),
         (b"PK\x03\x04", "a ZIP archive"),
+        (b"\x1f\x8b\x08\0\0\0\0\0\0\x03", "a gzip file"),
+        // An STL file without triangles is as long as its head, and tells nothing.
+        (&[0x80; 80].into_iter().chain([0; 4]).collect::<Vec<u8>>(), "an unknown kind of file"),
         (b"", "an empty file"),
         (b"\xff\xff\xff\xff\xff\xff\xff\xff\xff\xff", "an unknown kind of file"),
     ] {
@@ -245,8 +295,25 @@ fn unreadable_files_are_never_written() {
     let twice = [Section::new(TABLE[0], &[0_u8]); 2];
     let e = write_container(&twice, &BTreeMap::new()).unwrap_err().to_string();
     assert_eq!(e, "section flags: given twice");
+    let no_columns = Section::new(SectionSpec::required("none", Element::U8, 0), &[] as &[u8]);
+    let e = write_container(&[no_columns], &BTreeMap::new()).unwrap_err().to_string();
+    assert_eq!(e, "section none: 0 bytes are not whole rows of 0 bytes");
     let long = BTreeMap::from([("k".to_string(), "x".repeat(1 << 20))]);
     assert!(write_container(&[], &long).is_err());
+}
+
+/// A pipe cannot be mapped, and its length is not known before its end.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_container_is_read_from_a_pipe() {
+    use std::io::Write;
+    use std::os::fd::AsRawFd;
+    let (reader, mut writer) = std::io::pipe().unwrap();
+    writer.write_all(&sample()).unwrap();
+    drop(writer);
+    let container = Container::open(format!("/dev/fd/{}", reader.as_raw_fd()), TABLE).unwrap();
+    container.verify_checksums().unwrap();
+    assert_eq!(container.as_bytes(), sample());
 }
 
 #[test]

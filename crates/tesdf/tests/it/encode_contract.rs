@@ -62,6 +62,21 @@ fn a_cancelled_encode_stops_soon() {
     assert!(matches!(result, Err(EncodeError::Cancelled)), "{result:?}");
 }
 
+/// Whatever an encoding is doing when it is cancelled, it gives no asset.
+#[test]
+fn an_encode_that_is_cancelled_in_any_stage_gives_nothing() {
+    for stage in [Stage::Refine, Stage::Tighten] {
+        let progress = Progress::telling(move |progress| {
+            if progress.state().0 == stage {
+                progress.cancel();
+            }
+        });
+        let result = Encoder::new().preset(Preset::Fast).progress(&progress).encode(&ball());
+        assert!(matches!(result, Err(EncodeError::Cancelled)), "{stage:?}: {:?}", result.map(|_| ()));
+        assert_eq!(progress.state().0, stage, "it stops in the stage in which it is asked to");
+    }
+}
+
 #[test]
 fn progress_ends_in_the_last_stage() {
     let progress = Progress::default();

@@ -237,6 +237,12 @@ fn invalid_combinations_of_options_are_errors() {
     let conforming = Domain::Conforming(&conforming);
     assert_eq!(refused(conforming, EncodeOptions { max_entries: Some(0), ..fast() }), "max_entries");
     assert_eq!(refused(conforming, sampled(0, 0.999, zero)), "resolution");
-    assert_eq!(refused(conforming, sampled(8, 1.5, zero)), "shrink");
-    assert_eq!(refused(conforming, sampled(8, 0.999, Threshold::Absolute(f64::NAN))), "threshold");
+    for shrink in [1.5, 0.0, -0.5, f64::NAN] {
+        assert_eq!(refused(conforming, sampled(8, shrink, zero)), "shrink");
+    }
+    for number in [f64::NAN, f64::INFINITY, -1e-300] {
+        for threshold in [Threshold::Absolute(number), Threshold::Squared(number)] {
+            assert_eq!(refused(conforming, sampled(8, 0.999, threshold)), "threshold");
+        }
+    }
 }

@@ -1,19 +1,25 @@
 //! Assets with hostile bytes: opening is refused with a named error, or every query ends without a
 //! panic.
 
+use std::collections::BTreeMap;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
-use crate::support::cells::Cells;
+use crate::support::cells::{Cells, section};
 use crate::support::random::Random;
 use crate::support::reference::Reference;
 use crate::support::shapes::Shape;
+use crate::support::tetrahedra::grid;
 use crate::support::well_formed::WellFormed;
 use proptest::prelude::*;
 use tesdf::asset::about::Source;
-use tesdf::asset::{AssetError, layout, save_atomic};
-use tesdf::encode::{EncodeOptions, Encoder};
+use tesdf::asset::{AssetError, Section, SectionSpec, layout, save_atomic, write_container};
+use tesdf::base::{Inside, InsideRule};
+use tesdf::domain::{ConformingMesh, MAX_DEPTH};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset};
+use tesdf::geometry::internal::AabbTree;
 use tesdf::glam::DVec3;
-use tesdf::mesh::SolidMesh;
+use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::query::Precision;
 use tesdf::{Length, TeSdf};
 
@@ -257,4 +263,232 @@ fn lists_that_overlap_are_refused() {
     listed.zip(offsets).for_each(|(word, offset)| word.copy_from_slice(&(1 << 31 | offset).to_le_bytes()));
     let error = TeSdf::from_bytes(&bytes).unwrap_err().to_string();
     assert!(error.contains("domain.nodes") && error.contains("it overlaps others"), "{error}");
+}
+
+/// A section, and the bytes that it gets.
+type Change = (SectionSpec, Vec<u8>);
+
+fn rows<T: bytemuck::Pod>(spec: SectionSpec, rows: &[T]) -> Change {
+    (spec, bytemuck::cast_slice(rows).to_vec())
+}
+
+/// The file of the asset with other sections and metadata, and with their checksums.
+fn rewritten(asset: &TeSdf, changes: &[Change], metadata: &BTreeMap<String, String>) -> Vec<u8> {
+    let is_kept = |s: &Section| changes.iter().all(|(spec, _)| *spec != s.spec);
+    let mut sections: Vec<Section> = asset.container().sections().filter(is_kept).collect();
+    sections.extend(changes.iter().map(|(spec, bytes)| Section { spec: *spec, bytes }));
+    write_container(&sections, metadata).expect("whole rows")
+}
+
+fn with_changes(asset: &TeSdf, changes: &[Change]) -> Result<TeSdf, AssetError> {
+    TeSdf::from_bytes(&rewritten(asset, changes, asset.container().metadata()))
+}
+
+/// An asset with changed sections does not open, and the error names a section and says why.
+fn assert_refused(asset: &TeSdf, changes: &[Change], section: SectionSpec, expected: &str) {
+    match with_changes(asset, changes) {
+        Err(AssetError::Section { name, reason }) => {
+            assert!(name == section.name && reason.contains(expected), "{name}: {reason}; {expected}");
+        }
+        other => panic!("{}: {expected}: {:?}", section.name, other.map(|_| ())),
+    }
+}
+
+/// A forest whose first root is bisected this often, always at the first child. The other words are
+/// not of the domain.
+fn forest_of_depth(depth: u32) -> Vec<u32> {
+    let mut nodes = vec![layout::Node::NotOfDomain.encode(); 6 + 2 * depth as usize];
+    let mut word = 0;
+    for children in (6..).step_by(2).take(depth as usize) {
+        nodes[word] = layout::Node::Split(children).encode();
+        word = children as usize;
+    }
+    nodes
+}
+
+/// A face tree of this many nodes in a row. Each of them has the next one and a leaf.
+fn tree_in_a_row(nodes: u32) -> [Change; 2] {
+    let leaf = layout::TreeChild::Leaf(0, 1).encode();
+    let below = (1..nodes).map(|n| layout::TreeChild::Node(n).encode()).chain([leaf]);
+    let children: Vec<[u32; 2]> = below.map(|child| [child, leaf]).collect();
+    let boxes = vec![[0_f32; 12]; children.len()];
+    [rows(layout::TREE_CHILDREN, &children), rows(layout::TREE_BOXES, &boxes)]
+}
+
+#[test]
+fn sections_that_do_not_fit_each_other_are_refused_by_name() {
+    use layout::*;
+    let asset = small();
+    let f = asset.face_count();
+    let bytes = |spec: SectionSpec| {
+        let found = asset.container().sections().find(|s| s.spec == spec);
+        found.expect("the section").bytes.to_vec()
+    };
+    let less = |spec: SectionSpec| (spec, bytes(spec)[spec.row_size()..].to_vec());
+    let more = |spec: SectionSpec| (spec, [bytes(spec), vec![0; spec.row_size()]].concat());
+    let palettes = section::<u16>(&asset, PALETTES).len();
+    let p = palettes as u32;
+    let boxes = section::<[f32; 12]>(&asset, TREE_BOXES).len();
+    let depth = AabbTree::MAX_DEPTH;
+    let deep = format!("node {} is deeper than {depth}", depth + 1);
+    let of_faces = |n: usize| format!("{n} entries for {f} faces");
+    let cases: Vec<(Vec<Change>, SectionSpec, String)> = vec![
+        (vec![rows::<u32>(FACES, &[])], FACES, "0 faces; expected 1 to".into()),
+        (vec![less(FACE_IDS)], FACE_IDS, of_faces(f - 1)),
+        (vec![more(FACE_IDS)], FACE_IDS, of_faces(f + 1)),
+        (vec![less(SIGN_HINTS)], SIGN_HINTS, of_faces(f - 1)),
+        (vec![rows(FRAME, &[0_f64; 7])], FRAME, "7 numbers; expected 8".into()),
+        (vec![rows(FRAME, &[0_f64; 9])], FRAME, "9 numbers; expected 8".into()),
+        (
+            vec![rows(PALETTES_HIGH, &vec![0_u8; palettes + 1])],
+            PALETTES_HIGH,
+            format!("{} entries for {palettes}", palettes + 1),
+        ),
+        (vec![rows(PALETTES_HIGH, &vec![1_u8; palettes])], PALETTES, "entry 0 names a face".into()),
+        (vec![rows::<u32>(PALETTE_STARTS, &[])], PALETTE_STARTS, "does not begin at 0".into()),
+        (
+            vec![rows(PALETTE_STARTS, &[0, p, 0, p])],
+            PALETTE_STARTS,
+            "palette 1 has not 0 to 256 faces".into(),
+        ),
+        (
+            vec![rows(PALETTE_STARTS, &[0_u32, 257]), rows(PALETTES, &[0_u16; 257])],
+            PALETTE_STARTS,
+            "palette 0 has not 0 to 256 faces".into(),
+        ),
+        (vec![rows(NODES, &[0_u32; 5])], NODES, "5 words; expected the 6 roots at least".into()),
+        (
+            vec![rows(NODES, &forest_of_depth(MAX_DEPTH + 1))],
+            NODES,
+            format!("deeper than {MAX_DEPTH} bisections"),
+        ),
+        (
+            vec![rows::<u32>(TREE_CHILDREN, &[]), rows::<f32>(TREE_BOXES, &[])],
+            TREE_BOXES,
+            "0 boxes for 0 nodes".into(),
+        ),
+        (vec![less(TREE_BOXES)], TREE_BOXES, format!("{} boxes for {boxes} nodes", boxes - 1)),
+        (tree_in_a_row(depth as u32 + 2).to_vec(), TREE_CHILDREN, deep),
+        (vec![rows(SIGN_FACES, &[[0_u32, 1, 2]])], SIGN_FACES, "no rule that counts them".into()),
+    ];
+    for (changes, section, expected) in &cases {
+        assert_refused(&asset, changes, *section, expected);
+    }
+
+    // As deep as may be, and with bits of faces that a small asset can do without.
+    let chain = rows(NODES, &forest_of_depth(MAX_DEPTH));
+    assert!(with_changes(&asset, &[chain]).is_ok());
+    let error = with_changes(&asset, &tree_in_a_row(depth as u32 + 1)).expect_err("faces are missing");
+    assert!(error.to_string().contains("leaves hold"), "{error}");
+    let high = with_changes(&asset, &[rows(PALETTES_HIGH, &vec![0_u8; palettes])]).expect("whole");
+    for k in 0..20 {
+        let p = DVec3::splat(0.1 * f64::from(k) - 0.9);
+        assert_eq!(high.query(p), asset.query(p));
+    }
+}
+
+/// Files of more faces than words can name are mostly a hole, which takes no room and no time.
+#[test]
+fn more_faces_than_words_can_name_are_refused() {
+    let asset = small();
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("large.tesdf");
+    let rows = (layout::MAX_FACES + 1) as u64;
+    let bytes = asset.as_bytes();
+    let end = asset.container().header_size();
+    let json = std::str::from_utf8(&bytes[8..end]).expect("JSON");
+    let faces = ranges(&asset).into_iter().find(|r| r.0 == layout::FACES.name).expect("the section").1;
+    let (from, to) = (faces.start - end, faces.end - end);
+    let old = format!("\"shape\":[{},3],\"data_offsets\":[{from},{to}]", asset.face_count());
+    assert!(json.contains(&format!("\"{}\":{{\"dtype\":\"U32\",{old}", layout::FACES.name)), "{json}");
+    // The sections after the faces follow the hole.
+    let more = (rows - asset.face_count() as u64) * layout::FACES.row_size() as u64;
+    let mut json = json
+        .trim_end()
+        .replace(&old, &format!("\"shape\":[{rows},3],\"data_offsets\":[{from},{}]", to as u64 + more));
+    for (name, range) in ranges(&asset).into_iter().filter(|(_, range)| range.start >= faces.end) {
+        let [from, to] = [range.start - end, range.end - end];
+        let moved = format!("[{},{}]", from as u64 + more, to as u64 + more);
+        let old = format!("\"data_offsets\":[{from},{to}]");
+        assert!(json.contains(&old), "{name}");
+        json = json.replace(&old, &format!("\"data_offsets\":{moved}"));
+    }
+    while !json.len().is_multiple_of(8) {
+        json.push(' ');
+    }
+    let head = [&(json.len() as u64).to_le_bytes()[..], json.as_bytes(), &bytes[end..faces.end]].concat();
+    std::fs::write(&path, head).expect("a writable folder");
+    let mut file = std::fs::OpenOptions::new().write(true).open(&path).expect("the file");
+    let length = file.metadata().expect("a length").len();
+    file.set_len(length + more).expect("a hole");
+    file.seek(SeekFrom::End(0)).expect("the end");
+    file.write_all(&bytes[faces.end..]).expect("room");
+    drop(file);
+    let error = TeSdf::open(&path).expect_err("too many faces").to_string();
+    assert_eq!(error, format!("section mesh.faces: {rows} faces; expected 1 to {}", layout::MAX_FACES));
+}
+
+/// A cube in a conforming domain of a few tetrahedra.
+fn conforming() -> TeSdf {
+    let (solid, tetrahedra) = grid(3, 0.1, |x, y, z| (x, y, z) == (1, 1, 1));
+    let domain = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
+    let encoder = Encoder::new().preset(Preset::Fast).domain(Domain::Conforming(&domain));
+    encoder.encode(&solid).expect("valid options")
+}
+
+#[test]
+fn damaged_tetrahedra_are_refused_by_name() {
+    use layout::*;
+    let asset = conforming();
+    let mut vertices: Vec<[f64; 3]> = section(&asset, DOMAIN_VERTICES);
+    let mut tetrahedra: Vec<[u32; 4]> = section(&asset, TETRAHEDRA);
+    let count = vertices.len() + section::<[f64; 3]>(&asset, VERTICES).len();
+    vertices[7][1] = f64::NAN;
+    tetrahedra[5][2] = count as u32;
+    let used = format!("tetrahedron 5 uses {:?} of {count} vertices", tetrahedra[5]);
+    assert_refused(&asset, &[rows(DOMAIN_VERTICES, &vertices)], DOMAIN_VERTICES, "vertex 7 is not finite");
+    assert_refused(&asset, &[rows(TETRAHEDRA, &tetrahedra)], TETRAHEDRA, &used);
+    assert_refused(&asset, &[rows::<u32>(TETRAHEDRA, &[])], TETRAHEDRA, "there is no tetrahedron");
+    tetrahedra[5][2] = count as u32 - 1;
+    assert!(with_changes(&asset, &[rows(TETRAHEDRA, &tetrahedra)]).is_ok(), "all vertices exist");
+}
+
+/// What the metadata says of the sign fits the sections and the certificate, or is refused.
+#[test]
+fn signs_that_do_not_fit_are_refused() {
+    let asset = conforming();
+    let mut metadata = asset.container().metadata().clone();
+    metadata.insert("inside".into(), "rule".into());
+    let error = TeSdf::from_bytes(&rewritten(&asset, &[], &metadata)).expect_err("cells tell the side");
+    let text = error.to_string();
+    assert!(text.starts_with("section domain.tetrahedra: a conforming domain, whose cells tell"), "{text}");
+
+    let plate = TriangleMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]).expect("valid ids");
+    let inside = Inside::new(InsideRule::Sheet { thickness: 0.34375 });
+    let plate = SolidMesh::with_inside(plate, inside).expect("a sheet");
+    let asset = Encoder::new().preset(Preset::Fast).encode(&plate).expect("valid options");
+    let metadata = asset.container().metadata();
+    let fit = "the certificate's rule sheet does not fit the key inside";
+    let cases = [
+        ("0.34375", "0.0", fit),
+        ("0.34375", "-0.34375", fit),
+        ("0.34375", "1e999", "the metadata's certificate is not what was expected: number out of range"),
+        ("0.34375", "null", "the metadata's certificate is not what was expected: invalid type"),
+    ];
+    for (from, to, expected) in cases {
+        let mut metadata = metadata.clone();
+        let certificate = metadata.get_mut("certificate").expect("the certificate");
+        assert!(certificate.contains(from), "{certificate}");
+        *certificate = certificate.replace(from, to);
+        let error = TeSdf::from_bytes(&rewritten(&asset, &[], &metadata)).expect_err("no thickness");
+        assert!(error.to_string().contains(expected), "{to}: {error}");
+    }
+    for (signs, expected) in
+        [("cells", fit), ("rule", fit), ("sheets", "inside is sheets; expected cells, rule")]
+    {
+        let mut metadata = metadata.clone();
+        metadata.insert("inside".into(), signs.into());
+        let error = TeSdf::from_bytes(&rewritten(&asset, &[], &metadata)).expect_err("another rule");
+        assert!(error.to_string().contains(expected), "{signs}: {error}");
+    }
 }

@@ -5,11 +5,13 @@ use crate::support::brute_inside::BruteInside;
 use crate::support::parts::Turn::{Inward, Outward};
 use crate::support::parts::{Parts, bowl, moebius};
 use crate::support::random::Random;
+use crate::support::tetrahedra::grid;
 use proptest::prelude::*;
 use tesdf::TeSdf;
 use tesdf::asset::{FORMAT_VERSION, FORMAT_VERSION_OF_RULES};
 use tesdf::base::{Inside, InsideRule, SurfaceFaces};
-use tesdf::encode::{EncodeError, Encoder, Preset};
+use tesdf::domain::ConformingMesh;
+use tesdf::encode::{Domain, EncodeError, EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{DefectKind, SolidMesh, TriangleMesh};
 use tesdf::query::Precision;
@@ -253,6 +255,48 @@ fn options_that_do_not_fit_are_refused() {
         let solid = SolidMesh::with_inside(open.clone(), Sheet { thickness }.into()).expect("any mesh");
         let error = Encoder::new().encode(&solid).expect_err("no thickness");
         assert!(matches!(error, EncodeError::Option { option: "thickness", .. }), "{error}");
+    }
+
+    let closed = Parts::default().cube(DVec3::ZERO, 1.0, Outward).mesh();
+    let boundary = |rule| Inside { rule, surface: SurfaceFaces::Boundary };
+    let sheet = Sheet { thickness: 0.1 };
+    let none = EncodeOptions::default;
+    let odd = EncodeOptions { inside: Odd.into(), ..none() };
+    for (mesh, inside, options, name, found) in [
+        (&closed, Nonzero.into(), odd.clone(), "inside", "odd"),
+        (&closed, Inside::default(), odd, "inside", "odd"),
+        (&closed, boundary(sheet), none(), "surface", "boundary"),
+        (&open, boundary(Generalized), none(), "surface", "boundary"),
+    ] {
+        let solid = SolidMesh::with_inside(mesh.clone(), inside).expect("a solid");
+        match Encoder::new().options(options).encode(&solid) {
+            Err(EncodeError::Option { option, found: text, .. }) => {
+                assert!(option == name && text.contains(found), "{inside:?}: {option} is {text}");
+            }
+            other => panic!("{inside:?}: {:?}", other.map(|_| ())),
+        }
+    }
+    // The options may say again what the solid says.
+    let solid = SolidMesh::with_inside(closed, Odd.into()).expect("a solid");
+    let same = EncodeOptions { inside: Odd.into(), ..EncodeOptions::preset(Preset::Fast) };
+    assert!(Encoder::new().options(same).encode(&solid).is_ok());
+}
+
+/// The cells of a conforming domain tell the side, so the winding number of the faces has to.
+#[test]
+fn a_conforming_domain_takes_only_rules_that_the_winding_number_tells() {
+    let (solid, tetrahedra) = grid(3, 0.1, |x, y, z| (x, y, z) == (1, 1, 1));
+    let domain = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
+    for (rule, is_taken) in [(Odd, true), (Generalized, true), (Sheet { thickness: 0.1 }, false)] {
+        let solid = SolidMesh::with_inside(solid.mesh().clone(), rule.into()).expect("a solid");
+        let encoder = Encoder::new().preset(Preset::Fast).domain(Domain::Conforming(&domain));
+        match encoder.encode(&solid) {
+            Ok(_) => assert!(is_taken, "{rule:?}"),
+            Err(EncodeError::Option { option: "inside", found, .. }) => {
+                assert!(!is_taken && found == "sheet, in a conforming domain", "{rule:?}: {found}");
+            }
+            Err(e) => panic!("{rule:?}: {e}"),
+        }
     }
 }
 

@@ -1,4 +1,5 @@
 //! The tests of `tesdf` over several of its modules, in one program.
+mod about_assets;
 mod bars_and_needles;
 mod batch_columns;
 mod cad;
@@ -21,6 +22,7 @@ mod deepest_penetration;
 mod deformation;
 mod degenerate_faces;
 mod documents;
+mod encode_choices;
 mod encode_contract;
 mod encoders;
 mod entry;

@@ -5,11 +5,13 @@ use std::ops::ControlFlow;
 use serde_json::{Value, json};
 
 use crate::support::random::Random;
+use crate::support::reference::Reference;
 use crate::support::tetrahedra::grid;
 use tesdf::domain::ConformingMesh;
 use tesdf::encode::{Domain, EncodeOptions, Encoder, ImportJsonError, Refinement};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
+use tesdf::mesh::TriangleMesh;
 use tesdf::verify::{ProveOptions, ProveReport, Verdict, VerifyOptions, VerifyReport, prove, verify};
 use tesdf::{Preset, Source, TeSdf};
 
@@ -130,6 +132,79 @@ fn what_is_written_and_read_again_answers_the_same() {
                 assert!((b - a).cross(c - a).dot(d - a) < 0.0, "{group}: {t:?}");
             }
         }
+    }
+}
+
+/// Two tetrahedra that have one vertex in common are a solid, but no simple one: no feature alone
+/// tells the sign.
+#[test]
+fn solids_that_touch_at_a_vertex_answer_as_brute_force() {
+    let mut file = by_hand();
+    file["num_of_surface_nodes"] = json!(7);
+    file["num_of_faces"] = json!(8);
+    file["num_of_surface_inner_tetras"] = json!(2);
+    file["surface_nodes"] =
+        json!([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]]);
+    file["faces"] =
+        json!([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 4, 5], [0, 6, 4], [4, 6, 5], [5, 6, 0],]);
+    file["surface_inner_tetras"] = json!([[0, 1, 3, 2], [0, 4, 5, 6]]);
+    file["surface_outer_tetras"] = json!([[1, 2, 3, 7]]);
+    let all = [0, 1, 2, 3, 4, 5, 6, 7];
+    file["nums_of_encoded_faces_surface_inner"] = json!([8, 8]);
+    file["encoded_faces_surface_inner"] = json!([all, all]);
+    let asset = import(&file).unwrap();
+
+    let corners = |key: &str| -> Vec<[f64; 3]> { serde_json::from_value(file[key].clone()).unwrap() };
+    let vertices = corners("surface_nodes").into_iter().map(DVec3::from_array).collect();
+    let faces: Vec<[u32; 3]> = serde_json::from_value(file["faces"].clone()).unwrap();
+    let reference = Reference::new(&TriangleMesh::new(vertices, faces).unwrap());
+    let mut random = Random(5);
+    let mut inside = 0;
+    for k in 0..600 {
+        // Many of the points are near the common vertex.
+        let p = [1.0, 0.1, 1e-4][k % 3] * random.in_cube();
+        let (found, expected) = (asset.signed_distance(p), reference.signed_distance(p));
+        assert!((found - expected).abs() <= reference.tolerance_f64(p), "{p}: {found}, expected {expected}");
+        inside += usize::from(found < 0.0);
+    }
+    assert!((60..540).contains(&inside), "{inside} inside");
+
+    // Lists that are nested tell their own lengths, which the file may give all the same.
+    file["nums_of_encoded_faces_surface_inner"] = json!([8, 7]);
+    let error = import(&file).unwrap_err().to_string();
+    assert!(error.contains("nums_of_encoded_faces_surface_inner[1]: 7, expected 8"), "{error}");
+    file.as_object_mut().unwrap().remove("nums_of_encoded_faces_surface_inner");
+    assert!(import(&file).is_ok());
+}
+
+#[test]
+fn lengths_may_be_left_out_where_lists_are_nested_or_none() {
+    let lists = "encoded_faces_surface_inner";
+    let of_lists = "nums_of_encoded_faces_surface_inner";
+    let without = |key: &str, value: Value| {
+        let mut file = by_hand();
+        file[lists] = value;
+        file.as_object_mut().unwrap().remove(key);
+        import(&file).map_err(|e| e.to_string())
+    };
+    let point = DVec3::splat(0.1);
+    let expected = import(&by_hand()).unwrap().signed_distance(point);
+    for (key, value) in [
+        (of_lists, json!([[0, 1, 2, 3]])),
+        (of_lists, json!([[3, 1, 2, 0, 3, 3]])),
+        // A group without tetrahedra has no lists.
+        ("nums_of_encoded_faces_inner", json!([0, 1, 2, 3])),
+        ("encoded_faces_inner", json!([0, 1, 2, 3])),
+    ] {
+        assert_eq!(without(key, value.clone()).unwrap().signed_distance(point), expected, "{key}: {value}");
+    }
+    for (value, expected) in [
+        (json!([0, 1, 2, 3]), "nums_of_encoded_faces_surface_inner"),
+        (json!([[0, 1], [2, 3]]), "encoded_faces_surface_inner: 2 lists, expected 1 lists"),
+        (json!([[]]), "encoded_faces_surface_inner: list 0 is empty"),
+    ] {
+        let error = without(of_lists, value.clone()).unwrap_err();
+        assert!(error.contains(expected), "{value}: {error}");
     }
 }
 
