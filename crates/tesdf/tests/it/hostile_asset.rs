@@ -13,7 +13,7 @@ use crate::support::tetrahedra::grid;
 use crate::support::well_formed::WellFormed;
 use proptest::prelude::*;
 use tesdf::asset::about::Source;
-use tesdf::asset::{AssetError, Section, SectionSpec, layout, save_atomic, write_container};
+use tesdf::asset::{AssetError, CellKind, Section, SectionSpec, layout, save_atomic, write_container};
 use tesdf::base::{Inside, InsideRule};
 use tesdf::domain::{ConformingMesh, MAX_DEPTH};
 use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset};
@@ -29,8 +29,10 @@ fn ball() -> SolidMesh {
 
 /// A small asset with every kind of cell: outside, inside, crossing, far, not of the domain.
 fn small() -> TeSdf {
-    let options =
-        EncodeOptions { byte_worth: 0.5, band: Length::OfDiagonal(0.3), ..EncodeOptions::default() };
+    // Between the ball and the region is no part of the domain.
+    let regions = vec![[3.0, 3.0, 3.0, 3.5, 3.5, 3.5]];
+    let band = Length::OfDiagonal(0.3);
+    let options = EncodeOptions { byte_worth: 0.1, band, regions, ..EncodeOptions::default() };
     let source = Source { name: "ball.obj".into(), blake3: "0".repeat(64), repair: None };
     Encoder::new().options(options).source(source.clone()).encode(&ball()).expect("valid options")
 }
@@ -60,6 +62,17 @@ fn the_golden_asset_answers() {
         assert!(error.abs() <= reference.tolerance_f64(p), "{kind:?} {p}: {error:e}");
         let error = asset.signed_distance_f32(p) - reference.signed_distance(p);
         assert!(error.abs() <= 2.0 * reference.tolerance_f32(p), "{kind:?} {p}: {error:e}");
+    }
+}
+
+#[test]
+fn the_small_asset_has_every_kind_of_cell() {
+    let mut kinds = Vec::new();
+    small().visit_cells(|cell| kinds.push(cell.kind));
+    let is_far = |kind: &CellKind| matches!(kind, CellKind::FarOutside | CellKind::FarInside);
+    assert!(kinds.iter().any(is_far));
+    for kind in [CellKind::Outside, CellKind::Inside, CellKind::Crossing, CellKind::NotOfDomain] {
+        assert!(kinds.contains(&kind), "{kind:?}");
     }
 }
 
