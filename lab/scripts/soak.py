@@ -6,8 +6,8 @@
     VENV/bin/python lab/scripts/soak.py --hours 33.6 > table.md     # a week of five parts, one after the other
 
 - *stack*: ten cubes on each other, awake: no coordinate moves by 1 pm.
-- *nut*: goes up and down its bolt by half a turn, as gravity turns around; depth below 1 µm, travel and turns within
-  the play of the thread.
+- *nut*: goes up and down its bolt by half a turn, as gravity turns around and brakes it; depth below 1 µm, travel and
+  turns within the play of the thread.
 - *worlds*: 64 worlds of boxes of random sizes that are thrown again and again; all finite, none through the floor.
 - *mujoco*: the nut in MuJoCo with contacts of tesdf, up and down.
 - *encodes*: random meshes; signed distances at random points against numpy's brute force, within 1e-12 of the
@@ -29,6 +29,7 @@ from make_reference import sdf  # of data, which `measured` adds to the path
 
 PITCH = 2e-3  # m, of the thread
 PLAY = 60e-6  # m, of the thread along its axis
+FASTEST = 1.5  # turns a second; nothing else slows a nut down that turns around again and again
 GROWTH = 8e6  # bytes that memory may grow by after the first tenth
 
 
@@ -63,20 +64,27 @@ def turned(before, after):
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
+def driven(turns, rate, drive):
+    """the gravity along z, m/s², that drives a nut on between 0 and half a turn, and `drive` without braking"""
+    drive = -9.81 if turns < 0 else 9.81 if turns > 0.5 else drive
+    return (-drive if abs(rate) > FASTEST and rate * drive < 0 else drive), drive
+
+
 def nut(_):
     scene = tesdf.Simulation(ROOT / "scenes/bolt-nut.toml", history=False)
     which = scene.bodies.index("nut")
-    start, turns = scene.poses[which, 2], 0.0
+    start, turns, drive = scene.poses[which, 2], 0.0, -9.81
     while True:
         deepest = 0.0
         for _ in range(10):
             before = scene.poses[which]
             scene.step()
-            turns += turned(before[3:5], scene.poses[which, 3:5]) / (2 * np.pi)
+            turn = turned(before[3:5], scene.poses[which, 3:5]) / (2 * np.pi)
+            turns += turn
             if len(scene.contacts.distance):
                 deepest = max(deepest, -scene.contacts.distance.min())
-            if not 0 <= turns <= 0.5:
-                scene.set_gravity([0, 0, -9.81 if turns < 0 else 9.81])
+            gravity, drive = driven(turns, turn / 5e-3, drive)
+            scene.set_gravity([0, 0, gravity])
         off = abs(start - scene.poses[which, 2] - turns * PITCH)
         expect(deepest < 1e-6, f"step {scene.steps}: {deepest:g} m deep")
         expect(off < PLAY, f"step {scene.steps}: travel and turns differ by {off:g} m")
@@ -115,13 +123,13 @@ def in_mujoco(_):
     assets = {name: tesdf.encode(ROOT / f"data/procedural/{file}.obj", "fast") for name, file in parts.items()}
     contacts = tesdf.mujoco.Contacts(model, assets)
     mujoco.mj_forward(model, data)
-    turns, clearance = 0.0, 0.0
+    turns, clearance, drive = 0.0, 0.0, -9.81
     while True:
         for _ in range(100):
             contacts.step(model, data)
-            turns += data.qvel[5] * model.opt.timestep / (2 * np.pi)
-            if not 0 <= turns <= 0.5:
-                model.opt.gravity[2] = -9.81 if turns < 0 else 9.81
+            rate = data.qvel[5] / (2 * np.pi)
+            turns += rate * model.opt.timestep
+            model.opt.gravity[2], drive = driven(turns, rate, drive)
         expect(np.isfinite(data.qpos).all(), f"{data.time:g} s: not finite")
         depth = -contacts.scene.clearance(0, 1).distance
         expect(depth < 20e-6, f"{data.time:g} s: {depth:g} m deep")
