@@ -152,6 +152,7 @@ impl Newton {
         Ok(())
     }
 
+    /// A part of a step, of `h` seconds of its `whole`. Nothing is known of it yet.
     pub(super) fn begin(&self, h: f64, whole: f64) -> Step {
         let states = self.system.states();
         let mut free_of = vec![None; states.len()];
