@@ -2,6 +2,7 @@
 //! corners of the mesh, the bytes to save.
 use std::borrow::Cow;
 
+use crate::support::meshes::encoded;
 use crate::support::parts::Parts;
 use crate::support::parts::Turn::Outward;
 use crate::support::shapes::Shape;
@@ -14,10 +15,6 @@ use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::{Source, TeSdf};
-
-fn encoded(solid: &SolidMesh) -> TeSdf {
-    Encoder::new().preset(Preset::Fast).encode(solid).expect("valid options")
-}
 
 #[test]
 fn a_repair_is_told_in_one_line() {

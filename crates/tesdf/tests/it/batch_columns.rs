@@ -1,10 +1,9 @@
 //! Batches into arrays give the answers of single queries, for any number of points, inside and
 //! outside the domain.
 
-use crate::support::meshes::named;
+use crate::support::meshes::{encoded, named};
 use crate::support::random::Random;
 use tesdf::TeSdf;
-use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::query::{Answer, AnswerColumns, BatchError, Extent, Precision};
 
@@ -46,7 +45,7 @@ impl Columns {
 
 fn asset() -> TeSdf {
     let solid = named("procedural/shaft_keyway.obj");
-    Encoder::new().preset(Preset::Fast).encode(&solid).unwrap()
+    encoded(&solid)
 }
 
 #[test]

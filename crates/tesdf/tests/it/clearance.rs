@@ -3,14 +3,13 @@
 
 use std::sync::Arc;
 
-use crate::support::meshes::named;
+use crate::support::meshes::{encoded, named};
 use crate::support::random::Random;
 use crate::support::shapes::Shape as Surface;
 use tesdf::collide::{
     Clearance, ClearanceOptions, CollideError, CollideOptions, Instance, InstanceId, Mode, Pose, Scene,
     Shape, clearance, detect,
 };
-use tesdf::encode::{Encoder, Preset};
 use tesdf::geometry::Triangle;
 use tesdf::geometry::internal::polygon_to_triangle;
 use tesdf::glam::{DQuat, DVec3};
@@ -18,7 +17,7 @@ use tesdf::mesh::SolidMesh;
 use tesdf::{Length, TeSdf};
 
 fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
-    Arc::new(Encoder::new().preset(Preset::Fast).encode(solid).expect("it encodes"))
+    Arc::new(encoded(solid))
 }
 
 fn bumpy(seed: u64) -> Arc<TeSdf> {

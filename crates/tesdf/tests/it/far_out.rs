@@ -2,22 +2,16 @@
 
 use std::sync::{Arc, LazyLock};
 
-use crate::support::meshes::named;
+use crate::support::meshes::{encoded, named};
 use crate::support::random::Random;
 use tesdf::TeSdf;
 use tesdf::collide::{
     ClearanceOptions, CollideError, CollideOptions, Instance, Mode, Motion, Pose, Scene, Shape,
     TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
 };
-use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::query::{Answer, AnswerColumns, Extent, Precision};
-
-fn encoded(solid: &SolidMesh) -> TeSdf {
-    let options = EncodeOptions::preset(Preset::Fast);
-    Encoder::new().options(options).encode(solid).expect("valid options")
-}
 
 static KEY: LazyLock<TeSdf> = LazyLock::new(|| encoded(&named("procedural/shaft_keyway.obj")));
 

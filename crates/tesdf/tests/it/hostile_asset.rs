@@ -6,16 +6,17 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use crate::support::cells::{Cells, section};
+use crate::support::meshes::encoded;
 use crate::support::random::Random;
 use crate::support::reference::Reference;
 use crate::support::shapes::Shape;
-use crate::support::tetrahedra::grid;
+use crate::support::tetrahedra::cube;
 use crate::support::well_formed::WellFormed;
 use proptest::prelude::*;
 use tesdf::asset::about::Source;
 use tesdf::asset::{AssetError, CellKind, Section, SectionSpec, layout, save_atomic, write_container};
 use tesdf::base::{Inside, InsideRule};
-use tesdf::domain::{ConformingMesh, MAX_DEPTH};
+use tesdf::domain::MAX_DEPTH;
 use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset};
 use tesdf::geometry::internal::AabbTree;
 use tesdf::glam::DVec3;
@@ -443,8 +444,7 @@ fn more_faces_than_words_can_name_are_refused() {
 
 /// A cube in a conforming domain of a few tetrahedra.
 fn conforming() -> TeSdf {
-    let (solid, tetrahedra) = grid(3, 0.1, |x, y, z| (x, y, z) == (1, 1, 1));
-    let domain = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
+    let (solid, domain) = cube();
     let encoder = Encoder::new().preset(Preset::Fast).domain(Domain::Conforming(&domain));
     encoder.encode(&solid).expect("valid options")
 }
@@ -479,7 +479,7 @@ fn signs_that_do_not_fit_are_refused() {
     let plate = TriangleMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]).expect("valid ids");
     let inside = Inside::new(InsideRule::Sheet { thickness: 0.34375 });
     let plate = SolidMesh::with_inside(plate, inside).expect("a sheet");
-    let asset = Encoder::new().preset(Preset::Fast).encode(&plate).expect("valid options");
+    let asset = encoded(&plate);
     let metadata = asset.container().metadata();
     let fit = "the certificate's rule sheet does not fit the key inside";
     let cases = [

@@ -2,15 +2,15 @@
 //! over all faces.
 
 use crate::support::brute_inside::BruteInside;
+use crate::support::meshes::encoded;
 use crate::support::parts::Turn::{Inward, Outward};
 use crate::support::parts::{Parts, bowl, moebius};
 use crate::support::random::Random;
-use crate::support::tetrahedra::grid;
+use crate::support::tetrahedra::cube;
 use proptest::prelude::*;
 use tesdf::TeSdf;
 use tesdf::asset::{FORMAT_VERSION, FORMAT_VERSION_OF_RULES};
 use tesdf::base::{Inside, InsideRule, SurfaceFaces};
-use tesdf::domain::ConformingMesh;
 use tesdf::encode::{Domain, EncodeError, EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{DefectKind, SolidMesh, TriangleMesh};
@@ -19,7 +19,7 @@ use tesdf::verify::{ProveOptions, VerifyOptions, prove, verify};
 
 fn encode(mesh: &TriangleMesh, rule: InsideRule) -> TeSdf {
     let solid = SolidMesh::with_inside(mesh.clone(), Inside::new(rule)).expect("a solid");
-    Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes")
+    encoded(&solid)
 }
 
 /// Points at which rules are delicate: on faces, edges and corners, in their planes, on the lattice of
@@ -285,8 +285,7 @@ fn options_that_do_not_fit_are_refused() {
 /// The cells of a conforming domain tell the side, so the winding number of the faces has to.
 #[test]
 fn a_conforming_domain_takes_only_rules_that_the_winding_number_tells() {
-    let (solid, tetrahedra) = grid(3, 0.1, |x, y, z| (x, y, z) == (1, 1, 1));
-    let domain = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
+    let (solid, domain) = cube();
     for (rule, is_taken) in [(Odd, true), (Generalized, true), (Sheet { thickness: 0.1 }, false)] {
         let solid = SolidMesh::with_inside(solid.mesh().clone(), rule.into()).expect("a solid");
         let encoder = Encoder::new().preset(Preset::Fast).domain(Domain::Conforming(&domain));
@@ -305,7 +304,7 @@ fn a_conforming_domain_takes_only_rules_that_the_winding_number_tells() {
 fn assert_boundary(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
     let inside = Inside { rule, surface: SurfaceFaces::Boundary };
     let solid = SolidMesh::with_inside(mesh.clone(), inside).expect("a solid");
-    let asset = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
+    let asset = encoded(&solid);
     let ids: Vec<u32> = (0..asset.face_count()).map(|at| asset.face_id(at)).collect();
     for (at, &id) in ids.iter().enumerate() {
         let [mut stored, mut own] = [asset.face_vertices(at), mesh.faces()[id as usize]];

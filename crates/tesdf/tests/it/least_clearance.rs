@@ -1,13 +1,13 @@
 //! The least clearance of many pairs against the clearance of each, and bounds from boxes.
 use std::sync::Arc;
 
+use crate::support::meshes::encoded;
 use crate::support::random::Random;
 use crate::support::shapes::Shape as Surface;
 use tesdf::collide::{
     ClearanceOptions, CollideError, Instance, InstanceId, LeastClearanceOptions, Pose, Scene, Shape,
     clearance, clearance_bound, least_clearance,
 };
-use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 
 const TOLERANCE: f64 = 1e-7;
@@ -17,7 +17,7 @@ fn bodies(seed: u64, spread: f64) -> (Scene, Vec<[InstanceId; 2]>) {
     let mut random = Random(seed);
     let mut scene = Scene::new();
     let solid = Surface::default().add_sphere(DVec3::ZERO, 2, || random.between(0.7, 1.0)).solid();
-    let bumpy = Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid).expect("it encodes"));
+    let bumpy = Arc::new(encoded(&solid));
     let shapes = [
         Shape::Mesh(bumpy),
         Shape::Box { half_extents: DVec3::new(0.3, 1.0, 0.2) },

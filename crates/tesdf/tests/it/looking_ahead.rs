@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use crate::support::meshes::encoded;
 use crate::support::parts::Parts;
 use crate::support::parts::Turn::Outward;
 use crate::support::random::Random;
@@ -13,7 +14,6 @@ use tesdf::collide::{
     CollideOptions, Instance, Mode, Motion, Pose, Reduction, Scene, Shape, Velocity, detect, instance_pairs,
     why,
 };
-use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
 
@@ -40,7 +40,7 @@ fn velocity(random: &mut Random) -> Velocity {
 fn wedge() -> TeSdf {
     let solid = Parts::default().cube(DVec3::splat(-0.4), 0.8, Outward).turned().mesh();
     let solid = SolidMesh::with_inside(solid, Inside::default()).expect("a solid");
-    Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes")
+    encoded(&solid)
 }
 
 /// The velocity at another place of the body that moves with `velocity` at `from`.

@@ -4,11 +4,11 @@ use std::sync::Arc;
 use tesdf::collide::{
     CollideOptions, Contact, ContactsPer, Instance, InstanceId, Mode, Pose, Scene, Shape, detect,
 };
-use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 
 use crate::support::blocks::{self, Block, Kind, Known, ON_SIDE, SLOPE, touching};
 use crate::support::bodies::rotation;
+use crate::support::meshes::encoded;
 use crate::support::random::Random;
 use crate::support::shapes;
 
@@ -145,7 +145,7 @@ fn no_two_contacts_are_at_one_place_with_one_normal() {
 fn a_ball_over_tiles_has_the_normal_of_their_plane() {
     let solid =
         shapes::Shape::default().add_box(DVec3::new(-1.0, -1.0, -0.2), DVec3::new(1.0, 1.0, 0.0), 10).solid();
-    let tiles = Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid).expect("tiles"));
+    let tiles = Arc::new(encoded(&solid));
     let mut random = Random(3);
     for gap in [-1e-4, 0.0, 1e-6, 1e-3] {
         for _ in 0..20 {

@@ -1,8 +1,7 @@
 //! The face tree gives the same distances, sides and gradients as the lists.
 
-use crate::support::meshes::named;
+use crate::support::meshes::{encoded, named};
 use crate::support::random::Random;
-use tesdf::encode::{Encoder, Preset};
 use tesdf::query::Precision;
 
 #[test]
@@ -10,7 +9,7 @@ fn queries_by_tree_and_by_lists_agree() {
     for file in ["procedural/cube.obj", "procedural/shaft_keyway.obj", "procedural/lobed_peg.obj"] {
         let solid = named(file);
         let (bounds, diagonal) = (solid.mesh().bounds(), solid.mesh().diagonal());
-        let asset = Encoder::new().preset(Preset::Fast).encode(&solid).unwrap();
+        let asset = encoded(&solid);
         let mut random = Random(1);
         for i in 0..4000 {
             let share = random.in_cube() * if i % 4 == 0 { 4.0 } else { 0.6 };

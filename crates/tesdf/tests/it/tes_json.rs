@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 
 use serde_json::{Value, json};
 
+use crate::support::meshes::encoded;
 use crate::support::random::Random;
 use crate::support::reference::Reference;
-use crate::support::tetrahedra::grid;
+use crate::support::tetrahedra::{cube, grid};
 use tesdf::domain::ConformingMesh;
 use tesdf::encode::{Domain, EncodeOptions, Encoder, ImportJsonError, Refinement};
 use tesdf::geometry::Triangle;
@@ -294,8 +295,8 @@ fn a_wrong_list_among_many_does_not_pass_and_is_named_with_its_amount() {
 
 #[test]
 fn the_bisection_domain_is_not_written() {
-    let (solid, _) = grid(3, 0.1, |x, y, z| (x, y, z) == (1, 1, 1));
-    let asset = Encoder::new().preset(Preset::Fast).encode(&solid).unwrap();
+    let (solid, _) = cube();
+    let asset = encoded(&solid);
     let error = asset.to_json_bytes().unwrap_err().to_string();
     assert!(error.contains("--domain gmsh"), "{error}");
 }

@@ -3,20 +3,19 @@
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use crate::support::meshes::named;
+use crate::support::meshes::{encoded, named};
 use crate::support::random::Random;
 use crate::support::shapes::Shape as Surface;
 use tesdf::collide::{
     ClearanceOptions, CollideError, Impact, Instance, InstanceId, Motion, Pose, Scene, Shape, TimeOfImpact,
     TimeOfImpactOptions, Velocity, clearance, time_of_impact,
 };
-use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
 use tesdf::{Length, TeSdf};
 
 fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
-    Arc::new(Encoder::new().preset(Preset::Fast).encode(solid).expect("it encodes"))
+    Arc::new(encoded(solid))
 }
 
 fn boxed(half: DVec3) -> Arc<TeSdf> {

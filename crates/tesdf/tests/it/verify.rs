@@ -2,20 +2,14 @@
 
 use std::ops::ControlFlow;
 
+use crate::support::meshes::encoded;
 use crate::support::shapes::Shape;
 use tesdf::TeSdf;
 use tesdf::asset::layout::{self, Label, Node};
 use tesdf::asset::{CellKind, SectionSpec};
-use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::inspect::{InspectOptions, inspect};
-use tesdf::mesh::SolidMesh;
 use tesdf::verify::{ClassErrors, PointClass, VerifyError, VerifyOptions, VerifyReport, verify};
-
-fn encoded(solid: &SolidMesh) -> TeSdf {
-    let options = EncodeOptions::preset(Preset::Fast);
-    Encoder::new().options(options).encode(solid).expect("valid options")
-}
 
 /// A ball with a box-shaped cavity, which has cells of every label.
 fn hollow() -> TeSdf {

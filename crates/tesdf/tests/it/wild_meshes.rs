@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use crate::support::brute_inside::BruteInside;
+use crate::support::meshes::encoded;
 use crate::support::random::Random;
 use tesdf::base::{Inside, InsideRule};
-use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh, read};
 use tesdf::verify::{VerifyOptions, verify};
@@ -29,7 +29,7 @@ fn file(name: &str) -> PathBuf {
 /// Encodes under a rule, and compares with brute force.
 fn assert_exact(name: &str, mesh: &TriangleMesh, rule: InsideRule) {
     let solid = SolidMesh::with_inside(mesh.clone(), Inside::new(rule)).expect("named by the refusal");
-    let asset = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
+    let asset = encoded(&solid);
     let brute = BruteInside::of_all(mesh, rule);
     let (bounds, diagonal) = (mesh.bounds(), mesh.diagonal());
     let mut random = Random(11);

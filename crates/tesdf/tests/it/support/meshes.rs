@@ -1,6 +1,13 @@
 use std::path::{Path, PathBuf};
 
+use tesdf::TeSdf;
+use tesdf::encode::{Encoder, Preset};
 use tesdf::mesh::{RepairOptions, SolidMesh, TriangleMesh, read, repair};
+
+/// The asset of a solid, with the preset `fast`.
+pub fn encoded(solid: &SolidMesh) -> TeSdf {
+    Encoder::new().preset(Preset::Fast).encode(solid).expect("valid options")
+}
 
 /// A row of `data/MANIFEST.tsv` for a mesh that can be encoded, as it is or after repair.
 pub struct Row {

@@ -61,6 +61,13 @@ pub fn grid(n: usize, jitter: f64, inside: impl Fn(usize, usize, usize) -> bool)
     (solid, TetMesh::new(points, tetrahedra).expect("valid tetrahedra"))
 }
 
+/// A cube, surrounded by tetrahedra.
+pub fn cube() -> (SolidMesh, ConformingMesh) {
+    let (solid, tetrahedra) = grid(3, 0.1, |x, y, z| (x, y, z) == (1, 1, 1));
+    let conforming = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
+    (solid, conforming)
+}
+
 /// A beam of 6 × 2 × 2 cubes, surrounded by tetrahedra.
 pub fn beam() -> (SolidMesh, ConformingMesh) {
     let inside = |x, y, z| (1..7).contains(&x) && (3..5).contains(&y) && (3..5).contains(&z);
