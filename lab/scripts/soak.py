@@ -77,13 +77,13 @@ def nut(_):
     while True:
         deepest = 0.0
         for _ in range(10):
-            before = scene.poses[which]
+            before, begun = scene.poses[which], scene.time
             scene.step()
             turn = turned(before[3:5], scene.poses[which, 3:5]) / (2 * np.pi)
             turns += turn
             if len(scene.contacts.distance):
                 deepest = max(deepest, -scene.contacts.distance.min())
-            gravity, drive = driven(turns, turn / 5e-3, drive)
+            gravity, drive = driven(turns, turn / (scene.time - begun), drive)
             scene.set_gravity([0, 0, gravity])
         off = abs(start - scene.poses[which, 2] - turns * PITCH)
         expect(deepest < 1e-6, f"step {scene.steps}: {deepest:g} m deep")

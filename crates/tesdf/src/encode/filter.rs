@@ -119,8 +119,10 @@ pub fn filter(
     point_rule(surface.isa, distances, &reach, centroid, radius + PAD, &mut scratch.alive, &mut scratch.near);
     if !n.is_multiple_of(GROUP) {
         let used = (1 << (n % GROUP)) - 1;
-        let last = scratch.alive.last_mut().into_iter().chain(scratch.near.last_mut());
-        last.for_each(|members| *members &= used);
+        if let (Some(alive), Some(near)) = (scratch.alive.last_mut(), scratch.near.last_mut()) {
+            *alive &= used;
+            *near &= used;
+        }
     }
 
     if surface.touching == Touching::Ignored {
