@@ -174,7 +174,7 @@ pub fn run_with(
     let mut live = args.view.then(|| follow(args, engine.system())).transpose()?;
     let bar = LiveProgress::new(interrupted);
     let mut recorder = Recorder::new(&output, &origin, earlier.as_ref());
-    let ended = simulate_from(&loaded.scene, &mut engine, begun, |moment| {
+    let watch = |moment: &Moment<'_>| {
         recorder.push(moment)?;
         if let Some(live) = &mut live {
             let frame = LiveFrame::from(moment);
@@ -183,7 +183,9 @@ pub fn run_with(
             shown.unwrap_or_else(|e| report::warning(&e.to_string()));
         }
         bar.show(moment)
-    });
+    };
+    // On a thread of the pool: from outside, each parallel call would switch threads twice.
+    let ended = rayon::scope(|_| simulate_from(&loaded.scene, &mut engine, begun, watch));
     drop(bar);
     let (record, summary) = ended.map_err(|e| recorder.failure(e, args.source()))?;
     recorder.finish(&record)?;
