@@ -372,8 +372,14 @@ impl Newton {
                 break;
             }
         }
-        let is_odd = |body: usize| place[body].is_some_and(|place| place % 2 == 1);
-        (0..own.len()).filter(|&body| is_odd(body)).for_each(|body| ahead[body] = own[body]);
+        for (body, place) in place.iter().enumerate() {
+            match place {
+                // What the others bring together has been seen, and is not looked at again.
+                None => ahead[body] = foreseen[body],
+                Some(place) if place % 2 == 1 => ahead[body] = own[body],
+                Some(_) => {}
+            }
+        }
         Ok(place.iter().any(Option::is_some))
     }
 
