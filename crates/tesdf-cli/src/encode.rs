@@ -158,12 +158,8 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let sampler = args.device.sampler()?;
     let encoded = watched(&progress, interrupted, || {
-        // On a thread of the pool: from outside, each parallel call would switch threads twice.
-        rayon::scope(|_| {
-            let encoder =
-                Encoder::new().options(options).source(source).sampler(&*sampler).progress(&progress);
-            encode(&solid, &args.mesh, &choices, encoder, &progress)
-        })
+        let encoder = Encoder::new().options(options).source(source).sampler(&*sampler).progress(&progress);
+        encode(&solid, &args.mesh, &choices, encoder, &progress)
     });
     if interrupted.load(Ordering::Relaxed) {
         return Err(Failure::new(format!("interrupted; {} is unchanged", args.output.display())));

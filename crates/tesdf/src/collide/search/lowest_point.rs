@@ -156,35 +156,7 @@ impl<'a> Search<'a> {
         if !self.orders.is_empty() {
             self.push_whole(0);
         }
-        let mut parts = 0;
-        let mut bound = f64::INFINITY;
-        loop {
-            if self.best.is_some_and(|(distance, ..)| distance <= self.enough) {
-                bound = self.bound_of_the_rest(self.open.least());
-                break;
-            }
-            let overlap = self.least() <= 0.0;
-            let is_done = self.open.least().is_none_or(|bound| bound >= self.least() - self.tolerance);
-            if overlap || is_done {
-                for order in std::mem::take(&mut self.waiting) {
-                    self.push_whole(order);
-                }
-            }
-            let batch = self.batch();
-            if batch.is_empty() {
-                break;
-            }
-            parts += batch.len() as u64;
-            if parts > max_parts {
-                bound = self.bound_of_the_rest(batch.iter().map(|(bound, _)| *bound));
-                break;
-            }
-            let found: Vec<SearchedPart> = match batch.len() {
-                ..FEW => batch.into_iter().map(|(bound, open)| self.search(bound, open)).collect(),
-                _ => batch.into_par_iter().map(|(bound, open)| self.search(bound, open)).collect(),
-            };
-            found.into_iter().for_each(|found| self.take(found));
-        }
+        let bound = self.rest(0, max_parts, false);
         let within = self.least() - self.tolerance;
         let (lower_bound, converged) = (bound.min(within) - self.beside, bound >= within);
         let least = self.best.map(|(distance, order, lowest)| Least {
@@ -195,6 +167,47 @@ impl<'a> Search<'a> {
             converged,
         });
         Below { least, lower_bound, converged }
+    }
+
+    /// Searches open parts, of which there have been `parts`. From the first large batch on, the
+    /// search runs in the pool. Returns a lower bound of what it leaves.
+    fn rest(&mut self, mut parts: u64, max_parts: u64, is_in_pool: bool) -> f64 {
+        loop {
+            if self.best.is_some_and(|(distance, ..)| distance <= self.enough) {
+                return self.bound_of_the_rest(self.open.least());
+            }
+            let overlap = self.least() <= 0.0;
+            let is_done = self.open.least().is_none_or(|bound| bound >= self.least() - self.tolerance);
+            if overlap || is_done {
+                for order in std::mem::take(&mut self.waiting) {
+                    self.push_whole(order);
+                }
+            }
+            let batch = self.batch();
+            if batch.is_empty() {
+                return f64::INFINITY;
+            }
+            parts += batch.len() as u64;
+            if parts > max_parts {
+                return self.bound_of_the_rest(batch.iter().map(|(bound, _)| *bound));
+            }
+            if batch.len() >= FEW && !is_in_pool {
+                return in_pool(|| {
+                    self.search_all(batch);
+                    self.rest(parts, max_parts, true)
+                });
+            }
+            self.search_all(batch);
+        }
+    }
+
+    /// Searches the parts of a batch.
+    fn search_all(&mut self, batch: Vec<(f64, Open)>) {
+        let found: Vec<SearchedPart> = match batch.len() {
+            ..FEW => batch.into_iter().map(|(bound, open)| self.search(bound, open)).collect(),
+            _ => batch.into_par_iter().map(|(bound, open)| self.search(bound, open)).collect(),
+        };
+        found.into_iter().for_each(|found| self.take(found));
     }
 
     fn least(&self) -> f64 {
