@@ -1,6 +1,7 @@
 //! Numbers of four rows at once. The compiler makes vector instructions of plain loops, and the
 //! bits are the same with and without them: nothing is fused, and sums have one order. Rows are
-//! written out: `array::map` and `array::from_fn` are inlined in none but the most optimised builds.
+//! written out: `array::map` and `array::from_fn` are inlined in none but the most optimised
+//! builds.
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Number of rows.

@@ -204,6 +204,19 @@ mod tests {
         ]
     "#;
 
+    /// Two balls that fall together, the lower one onto a plane, and three that fall far away.
+    const STOPPED: &str = r#"
+        solver.redetections = 0
+        bodies = [
+            { name = "floor", shape = "plane", fixed = true },
+            { name = "a", shape = { sphere = { radius = 0.02 } }, mass = 1, translation = [0, 0, 0.025], velocity = [0, 0, -2] },
+            { name = "b", shape = { sphere = { radius = 0.02 } }, mass = 1, translation = [0, 0, 0.069], velocity = [0, 0, -2] },
+            { name = "c", shape = { sphere = { radius = 0.02 } }, mass = 1, translation = [1, 0, 5], velocity = [0, 0, -2] },
+            { name = "d", shape = { sphere = { radius = 0.02 } }, mass = 1, translation = [2, 0, 5], velocity = [0, 0, -2] },
+            { name = "e", shape = { sphere = { radius = 0.02 } }, mass = 1, translation = [3, 0, 5], velocity = [0, 0, -2] },
+        ]
+    "#;
+
     /// An engine, and the numbers of its detections and of the instances that these looked at.
     fn engine(sleep: f64, bodies: &str) -> (Newton, Arc<[AtomicUsize; 2]>) {
         let text = format!("time_step = 5e-3\nduration = 1\nsolver.sleep = {sleep:?}\n{bodies}");
@@ -256,5 +269,18 @@ mod tests {
         let looks = counts[0].load(Ordering::Relaxed);
         assert!(looks < detections as usize, "{looks} of {detections}");
         assert_eq!(engine.seen.0.len(), 1);
+    }
+
+    /// The plane stops the lower ball, into which the upper one then falls. All others fall as was
+    /// foreseen, but for gravity, and are not looked at again.
+    #[test]
+    fn bodies_that_meet_as_was_foreseen_are_not_looked_at_again() {
+        let (mut engine, counts) = engine(0.0, STOPPED);
+        let report = engine.step(5e-3).unwrap();
+        let [looks, instances] = counts.each_ref().map(|n| n.load(Ordering::Relaxed));
+        assert_eq!((report.parts, report.detections, looks), (1, 2, 2));
+        assert_eq!(instances, 6 + 2, "the second look is at two balls");
+        let balls = engine.contacts().iter().filter(|c| c.instance_a.0.min(c.instance_b.0) > 0);
+        assert_eq!(balls.count(), 1);
     }
 }

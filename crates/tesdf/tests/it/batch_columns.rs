@@ -44,8 +44,7 @@ impl Columns {
 }
 
 fn asset() -> TeSdf {
-    let solid = named("procedural/shaft_keyway.obj");
-    encoded(&solid)
+    encoded(&named("procedural/shaft_keyway.obj"))
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::support::meshes::{encoded, named};
+use crate::support::meshes::{asset, named};
 use crate::support::random::Random;
 use crate::support::shapes::Shape as Surface;
 use tesdf::collide::{
@@ -13,12 +13,7 @@ use tesdf::collide::{
 use tesdf::geometry::Triangle;
 use tesdf::geometry::internal::polygon_to_triangle;
 use tesdf::glam::{DQuat, DVec3};
-use tesdf::mesh::SolidMesh;
 use tesdf::{Length, TeSdf};
-
-fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
-    Arc::new(encoded(solid))
-}
 
 fn bumpy(seed: u64) -> Arc<TeSdf> {
     let mut random = Random(seed);

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
+use crate::support::meshes;
 use crate::support::random::Random;
 use crate::support::shapes::Shape;
 use crate::support::tetrahedra::{bare_beam, beam, bend, moves};
@@ -173,7 +174,7 @@ fn refused_moves_change_nothing() {
     let p = DVec3::splat(4.2);
     let rest = encoded(&solid, &domain, &options());
     assert_eq!(asset.query(p), rest.query(p));
-    let mut bisected = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
+    let mut bisected = meshes::encoded(&solid);
     assert_eq!(bisected.move_vertices(&[]), Err(DeformError::NotConforming));
 }
 
@@ -207,13 +208,11 @@ fn assert_same(
 fn contacts_in_conforming_and_bisection_domains_agree() {
     for (solid, domain) in [beam(), bare_beam()] {
         let ball = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();
-        let bisected =
-            |solid: &SolidMesh| Encoder::new().preset(Preset::Fast).encode(solid).expect("encodes");
         let by_cost = EncodeOptions { refinement: Refinement::ByCost, byte_worth: 0.02, ..options() };
         let scene_of = |beam: TeSdf| {
             let mut scene = Scene::new();
             let beam = scene.add_shape(beam).expect("a shape");
-            let ball = scene.add_shape(bisected(&ball)).expect("a shape");
+            let ball = scene.add_shape(meshes::encoded(&ball)).expect("a shape");
             scene.add(Instance::new(beam, Pose::IDENTITY)).expect("a pose");
             scene.add(Instance::new(ball, Pose::at(DVec3::new(4.2, 5.6, 4.3)))).expect("a pose");
             (scene, beam)
@@ -223,7 +222,7 @@ fn contacts_in_conforming_and_bisection_domains_agree() {
                 let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
                 for encoding in [self::options(), by_cost.clone()] {
                     let conforming = lowest(&scene_of(encoded(&solid, &domain, &encoding)).0, &options);
-                    let expected = lowest(&scene_of(bisected(&solid)).0, &options);
+                    let expected = lowest(&scene_of(meshes::encoded(&solid)).0, &options);
                     assert_same(&conforming, &expected, contact_distance, 1e-6);
                 }
             }
@@ -233,7 +232,7 @@ fn contacts_in_conforming_and_bisection_domains_agree() {
         let mesh = scene.mesh_mut(beam).expect("a mesh");
         mesh.move_vertices(&moves(&domain, bend)).expect("moderate");
         mesh.reencode_stale().expect("room for lists");
-        let bent = scene_of(bisected(&moved(&solid, bend))).0;
+        let bent = scene_of(meshes::encoded(&moved(&solid, bend))).0;
         let options = CollideOptions { contact_distance: 0.1, ..CollideOptions::default() };
         assert_same(&lowest(&scene, &options), &lowest(&bent, &options), 0.1, 1e-6);
     }

@@ -4,6 +4,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::support::meshes;
 use crate::support::random::Random;
 use crate::support::reference::Reference;
 use crate::support::shapes::{FAMILIES, Family, Shape};
@@ -313,9 +314,7 @@ fn with_hair((more, faces): (Vec<DVec3>, Vec<[u32; 3]>)) -> TriangleMesh {
 #[test]
 fn faces_without_area_that_stand_out_are_left_out_where_they_are_no_surface() {
     let at = DVec3::new(0.0, 0.0, 3.0);
-    let distance = |solid: &SolidMesh| {
-        Encoder::new().preset(Preset::Fast).encode(solid).expect("it encodes").signed_distance(at)
-    };
+    let distance = |solid: &SolidMesh| meshes::encoded(solid).signed_distance(at);
     let tells = |warnings: &[Defect], what: &str| {
         let has = |d: &Defect| d.severity == Severity::Warning && d.message.ends_with(what);
         assert!(warnings.iter().any(has), "{what}: {warnings:?}");

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use crate::support::meshes::{encoded, named};
+use crate::support::meshes::{asset, named};
 use crate::support::random::Random;
 use crate::support::shapes::Shape as Surface;
 use tesdf::collide::{
@@ -11,12 +11,7 @@ use tesdf::collide::{
     TimeOfImpactOptions, Velocity, clearance, time_of_impact,
 };
 use tesdf::glam::{DQuat, DVec3};
-use tesdf::mesh::SolidMesh;
 use tesdf::{Length, TeSdf};
-
-fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
-    Arc::new(encoded(solid))
-}
 
 fn boxed(half: DVec3) -> Arc<TeSdf> {
     asset(&Surface::default().add_box(-half, half, 2).solid())

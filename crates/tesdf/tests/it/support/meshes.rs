@@ -1,4 +1,5 @@
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tesdf::TeSdf;
 use tesdf::encode::{Encoder, Preset};
@@ -7,6 +8,11 @@ use tesdf::mesh::{RepairOptions, SolidMesh, TriangleMesh, read, repair};
 /// The asset of a solid, with the preset `fast`.
 pub fn encoded(solid: &SolidMesh) -> TeSdf {
     Encoder::new().preset(Preset::Fast).encode(solid).expect("valid options")
+}
+
+/// The same, for the shapes of a scene.
+pub fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
+    Arc::new(encoded(solid))
 }
 
 /// A row of `data/MANIFEST.tsv` for a mesh that can be encoded, as it is or after repair.
