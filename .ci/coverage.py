@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Prints the coverage per crate and folder, from the JSON of `cargo llvm-cov`:
+"""Prints the coverage per crate and folder, from what `llvm-cov export` says of each program of tests:
 
-    .ci/coverage.py COVERAGE.json [FOLDER...]
+    .ci/coverage.py PROGRAM.json... [FOLDER...]
 
 Code of tests does not count. A generic function counts once: what any of its instances does counts as done.
 For each FOLDER (`tesdf/geometry`) it lists the ways of branches that are never taken."""
@@ -12,7 +12,8 @@ import pathlib
 import re
 import sys
 
-data, *listed = sys.argv[1:]
+exported = [argument for argument in sys.argv[1:] if argument.endswith(".json")]
+listed = [argument for argument in sys.argv[1:] if argument not in exported]
 crates = pathlib.Path(__file__).resolve().parent.parent / "crates"
 parts = {}
 
@@ -48,28 +49,28 @@ def part(name, known={}):
     return known[name]
 
 
-found = json.load(open(data))["data"][0]
-for function in found["functions"]:
-    names = function["filenames"]
-    for *place, count, file, _, kind in function["regions"]:
-        folder, end = part(names[file])
-        if kind == 0 and place[0] < end:
-            folder.regions[names[file], *place] += count
-    for *place, yes, no, file, _, _ in function["branches"]:
-        folder, end = part(names[file])
-        if place[0] < end:
-            ways = folder.branches[names[file], *place]
-            ways[0], ways[1] = ways[0] + yes, ways[1] + no
-for file in found["files"]:
-    # A line runs as often as the region that covers its beginning, or one that starts on it.
-    folder, end = part(file["filename"])
-    before = None
-    for (line, _, count, counts, starts, gap), after in zip(file["segments"], file["segments"][1:]):
-        if counts and line < end and starts and not gap:
-            folder.lines[file["filename"], line] += count
-        if counts:
-            for covered in range(line + 1, min(after[0] + 1, end)):
-                folder.lines[file["filename"], covered] += count
+def add(found):
+    """Adds what one program does."""
+    for function in found["functions"]:
+        names = function["filenames"]
+        for *place, count, file, _, kind in function["regions"]:
+            folder, end = part(names[file])
+            if kind == 0 and place[0] < end:
+                folder.regions[names[file], *place] += count
+        for *place, yes, no, file, _, _ in function["branches"]:
+            folder, end = part(names[file])
+            if place[0] < end:
+                ways = folder.branches[names[file], *place]
+                ways[0], ways[1] = ways[0] + yes, ways[1] + no
+    for file in found["files"]:
+        # A line runs as often as the region that covers its beginning, or one that starts on it.
+        folder, end = part(file["filename"])
+        for (line, _, count, counts, starts, gap), after in zip(file["segments"], file["segments"][1:]):
+            if counts and line < end and starts and not gap:
+                folder.lines[file["filename"], line] += count
+            if counts:
+                for covered in range(line + 1, min(after[0] + 1, end)):
+                    folder.lines[file["filename"], covered] += count
 
 
 def row(name, counted):
@@ -81,13 +82,15 @@ def row(name, counted):
     print(f"| {name:24} | {' | '.join(f'{share:16}' for share in shares)} |")
 
 
+for file in exported:
+    add(json.load(open(file))["data"][0])
 print(f"| {'':24} | {'lines':16} | {'regions':16} | {'branches':16} |\n|{'-' * 26}{('|' + '-' * 18) * 3}|")
 for crate in dict.fromkeys(name.split("/")[0] for name in sorted(parts)):
     inside = sorted(name for name in parts if name.startswith(f"{crate}/"))
     row(crate, [parts[name] for name in inside])
     for name in inside:
         row(name, [parts[name]])
-for name in listed:
+for name in filter(parts.get, listed):
     for (file, line, column, *_), ways in sorted(parts[name].branches.items()):
         for way, count in zip(("true", "false"), ways):
             if not count:

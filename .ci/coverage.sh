@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Prints how many lines, regions and branches the tests reach, per crate and folder, and the branches of four folders
-# of `tesdf` that go one way alone. It runs unit tests and `it` of `tesdf`; with other arguments for `cargo test`, the
-# tests that they name: `.ci/coverage.sh -p tesdf-sim --lib`. It needs rustup, and installs a nightly compiler of a
-# fixed date and cargo-llvm-cov.
+# of `tesdf` that go one way alone. It runs unit tests and `it` of all crates but `tesdf-gpu`; with other arguments for
+# `cargo test`, the tests that they name: `.ci/coverage.sh -p tesdf-sim --lib`. A test that fails, for example without
+# Gmsh, does not stop it. It needs rustup, and installs a nightly compiler of a fixed date and cargo-llvm-cov.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
@@ -16,9 +16,23 @@ if [ "$(cargo llvm-cov --version 2>/dev/null)" != "cargo-llvm-cov $version" ]; t
     step "coverage" cargo install --quiet --locked --root target/tools "cargo-llvm-cov@$version"
 fi
 
-report=$PWD/target/coverage.json
+crates="-p tesdf -p tesdf-sim -p tesdf-parts -p tesdf-playback -p tesdf-rapier -p tesdf-cli"
 # The nightly compiler puts the examples where the tests of them do not look.
-[ $# -gt 0 ] || set -- -p tesdf --lib --test it -- --skip examples::
+[ $# -gt 0 ] || set -- $crates --lib --test it -- --skip examples:: --skip outlines::
+folder=$PWD/target/llvm-cov-target
+mkdir -p "$folder/quick"
+programs() {
+    find "$folder/quick" -type f -executable ! -name '*.so' ! -name 'build?script*' "$@"
+}
+programs -delete
+rm -f "$folder"/*.profraw "$folder"/*.json
 # Optimised, and without checks that a debug build adds: these have branches that no test may take.
-step "coverage" cargo "+$nightly" llvm-cov --branch --profile quick --json --output-path "$report" "$@"
-python3 .ci/coverage.py "$report" tesdf/geometry tesdf/encode tesdf/asset tesdf/query
+step "coverage" cargo "+$nightly" llvm-cov --no-report --branch --profile quick --ignore-run-fail "$@"
+tools=$(rustc "+$nightly" --print target-libdir)/../bin
+"$tools/llvm-profdata" merge --sparse "$folder"/*.profraw -o "$folder/all.profdata"
+# One program at a time: of several, `llvm-cov` says of a function what the first one says that has it.
+programs | while read -r program; do
+    report=$folder/$(basename "$program").json
+    "$tools/llvm-cov" export --instr-profile "$folder/all.profdata" "$program" >"$report"
+done
+python3 .ci/coverage.py "$folder"/*.json tesdf/geometry tesdf/encode tesdf/asset tesdf/query
