@@ -54,6 +54,11 @@ fn the_forces_of_a_stack_are_its_weight() {
             let (_, steps) = steps(sleep, &bodies, 2.0, &bench);
             let Step { forces, report, .. } = &steps[steps.len() - 1];
             assert_eq!(report.asleep, if sleep.is_empty() { 3 } else { 0 });
+            for (body, sum) in forces.on_each(4).into_iter().enumerate() {
+                let weight = [6.0, -1.0, -2.0, -3.0][body] * -G;
+                assert!((sum - weight * DVec3::Z).length() < 1e-4, "{body}: {sum}");
+                assert!(sum.distance(forces.on(body)) < 1e-9, "{body}: {sum} {}", forces.on(body));
+            }
             for (below, weight) in [(0, 6.0), (1, 5.0), (2, 3.0)] {
                 let between = forces.contacts.iter().filter(|c| c.bodies.contains(&below));
                 let between = between.filter(|c| c.bodies.contains(&(below + 1)));

@@ -15,7 +15,7 @@ use tesdf_sim::planning::{
 use tesdf_sim::robot::{Geometry, Robot as Description, composed};
 use tesdf_sim::scene_file::LoadedScene;
 
-use crate::support::meshes::bowl;
+use crate::support::meshes::{bowl, cuboid};
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/robots").join(name)
@@ -540,4 +540,74 @@ fn what_is_no_configuration_or_option_is_refused() {
     let found = lone.clearance(&[], TOLERANCE).unwrap();
     assert_eq!((found.distance, found.nearest), (f64::INFINITY, None));
     assert_eq!(lone.check_motion(&[], &[], &MotionOptions::default()).unwrap().verdict, MotionVerdict::Free);
+}
+
+/// Meshes of links have the scale of the file.
+#[test]
+fn a_link_that_is_a_mesh_is_as_near_as_the_same_box() {
+    let folder = tempfile::tempdir().unwrap();
+    let cube = cuboid(DVec3::NEG_ONE, DVec3::ONE);
+    let vertices = cube.vertices().iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
+    let faces = cube.faces().iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    std::fs::write(folder.path().join("cube.obj"), vertices.chain(faces).collect::<String>()).unwrap();
+    let robot = |geometry: &str| {
+        let path = folder.path().join("robot.urdf");
+        let arm = link("arm", geometry, [0.2, 0.0, 0.0]);
+        let turn = joint("turn", "revolute", ["base", "arm"], [0.0; 3], [0.0, 0.0, 1.0]);
+        std::fs::write(&path, format!("<robot name='r'><link name='base'/>{arm}{turn}</robot>")).unwrap();
+        let mut robot = load(&path)?;
+        robot.add_obstacle(
+            "ball",
+            Shape::Sphere { radius: 0.1 },
+            Pose::at(DVec3::new(0.25, 0.25, 0.02)),
+            1.0,
+        )?;
+        Ok::<_, PlanningError>(robot)
+    };
+    for (scale, size) in [("0.2 0.03 0.02", "0.4 0.06 0.04"), ("0.1", "0.2 0.2 0.2")] {
+        let mesh = robot(&format!("<mesh filename='cube.obj' scale='{scale}'/>")).unwrap();
+        let same = robot(&format!("<box size='{size}'/>")).unwrap();
+        let mut seen = [0; 2];
+        for k in 0..30 {
+            let q = [0.1 * f64::from(k)];
+            let [found, expected] =
+                [&mesh, &same].map(|robot| robot.clearance(&q, TOLERANCE).unwrap().distance);
+            let is_apart = expected > 0.0;
+            assert!(!is_apart || (found - expected).abs() <= 2.0 * TOLERANCE, "{k}: {found} {expected}");
+            assert_eq!(found > 0.0, is_apart, "{k}: {found} {expected}");
+            seen[usize::from(is_apart)] += 1;
+        }
+        assert!(seen[0] > 3 && seen[1] > 3, "{seen:?}");
+    }
+    let told = robot("<mesh filename='cube.obj' scale='0.1 0 0.1'/>").expect_err("it is flat").to_string();
+    assert!(told.contains("the scale is '0.1 0 0.1'; expected three numbers other than 0"), "{told}");
+}
+
+#[test]
+fn what_a_planner_would_get_wrong_is_refused_unless_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.xml");
+    let read = |more: &str, ignore: &[&str]| {
+        let body = "<worldbody><body name='a'><geom type='sphere' size='0.1'/></body></worldbody>";
+        std::fs::write(&path, format!("<mujoco>{body}{more}</mujoco>")).unwrap();
+        let ignore = ignore.iter().map(|element| element.to_string()).collect();
+        let options = RobotOptions { ignore, ..RobotOptions::default() };
+        Robot::load(&path, &options, &Progress::default())
+    };
+    let equality = "<equality><weld body1='a'/></equality>";
+    let told = read(equality, &[]).expect_err("a weld").to_string();
+    assert!(told.contains("or ignore \"equality\""), "{told}");
+    assert!(read(equality, &["equality"]).is_ok());
+    // Motors move what they move, and no pair of bodies comes nearer because of them.
+    assert!(read("<actuator><motor name='m'/></actuator>", &[]).is_ok());
+
+    let links: String = (1..=1000)
+        .map(|k| {
+            let name = format!("l{k}");
+            let fixed = joint(&format!("j{k}"), "fixed", ["l0", &name], [0.0; 3], [1.0, 0.0, 0.0]);
+            format!("<link name='{name}'/>{fixed}")
+        })
+        .collect();
+    let told = of_text(&format!("<link name='l0'/>{links}")).expect_err("too many").to_string();
+    assert!(told.contains("it has 1001 links; expected at most 1000"), "{told}");
 }

@@ -229,6 +229,13 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_a_cure() {
         ),
         ("", "", "motors = { j1 = { drive = { velocity = 1 } } }", "motors: that of j1 has no limit"),
         ("", "", "file2 = 'x'", "unknown field `file2`"),
+        ("<link name=\"two\">", "<link name=\"one\">", "", "line 8: the link one is there twice"),
+        ("<child link=\"one\"/>", "", "", "line 4: <joint> has no <child>; expected one"),
+        ("</robot>", "<link name=\"lone\"/></robot>", "", "line 10: the links palm and lone have no parent"),
+        ("<limit", "<axis xyz=\"0 0 0\"/><limit", "", "the axis of the joint j1 has no direction"),
+        ("<mass value=\"1\"/>", "", "", "line 2: <inertial> has no <mass>; expected one"),
+        (FINGERS, "<robot name='r'/>", "", "line 1: the robot has no link; expected at least one"),
+        (FINGERS, "<mujoco/>", "", "line 1: found <mujoco>; expected <robot> of URDF"),
     ] {
         let told = refusal(&FINGERS.replacen(from, to, 1), keys);
         assert!(told.contains(expected), "{told}\nexpected {expected}");

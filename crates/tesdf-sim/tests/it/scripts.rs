@@ -240,6 +240,18 @@ fn what_does_not_fit_is_refused_with_its_place() {
             "script 1 (left): it has no keyframes",
         ),
         ("motor = { drive = { velocity = 0 }, limit = 20 }", "", "the joint has no motor; give it one"),
+        (
+            "body = \"wrist\"\nkeyframes = [{ time = 0.3 }, { time = 0.8, translation = [0, 0, 0.18] }]",
+            "keyframes = [{ time = 0.3 }]",
+            "script 3: expected either body or joint",
+        ),
+        ("target = 0.05", "target = nan", "script 1 (left): the keyframe at 0 s has target NaN"),
+        ("translation = [0, 0, 0.18]", "turn = [0, inf, 0]", "expected finite numbers, rad"),
+        (
+            "body = \"wrist\"\nkeyframes = [{ time = 0.3 }, { time = 0.8, translation = [0, 0, 0.18] }]",
+            "body = \"brick\"\nkeyframes = [{ time = 0.3, force = [0, 0, nan] }]",
+            "script 3 (brick): the keyframe at 0.3 s has Wrench { force: DVec3(0.0, 0.0, NaN)",
+        ),
     ];
     crate::support::refused(GRIPPER, Path::new("scene.toml"), &cases);
 }

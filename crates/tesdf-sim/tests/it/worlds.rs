@@ -7,7 +7,8 @@ use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{
-    Drive, Dynamics, DynamicsError, Mass, MassProperties, Motor, State, World, Worlds, Wrench, simulate,
+    Drive, Dynamics, DynamicsError, Mass, MassProperties, Motor, PartialRun, Run, State, World, Worlds,
+    Wrench, simulate,
 };
 
 /// A stack that falls asleep, a door with a motor, a pendulum of two links, two balls with
@@ -200,6 +201,7 @@ fn a_world_that_is_reset_is_a_new_one() {
     let door = body(&reset, "door");
     let Mass::Free(mass) = heavy.engine().system().bodies()[door].mass else { panic!() };
     reset.engine_mut().set_mass(door, mass).unwrap();
+    assert_eq!(reset.first_masses()[door], world(ALL).engine().system().bodies()[door].mass);
     reset.engine_mut().set_friction(0, 0.1).unwrap();
     heavy.engine_mut().set_friction(0, 0.1).unwrap();
     reset.reset(None).unwrap();
@@ -375,12 +377,17 @@ velocity = [0, 0, -0.1]
         let run = simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap().1;
         assert!(!run.warnings.is_empty());
         let mut world = world(&text);
-        let first = world.snapshot();
+        let (first, mut recorded) = (world.snapshot(), world.clone());
         for _ in 0..run.steps {
             world.step().unwrap();
         }
         assert_eq!(world.warnings(), run.warnings);
         assert_eq!(world.unconverged_steps(), run.unconverged_steps);
+        let system = recorded.engine().system();
+        let mut record =
+            Run::new(&loaded.scene, system, PartialRun::new(&loaded.scene, system, String::new())).unwrap();
+        (0..run.steps).for_each(|_| recorded.step_of(&mut record).unwrap());
+        assert_eq!(recorded.warnings(), run.warnings);
         let last = world.snapshot();
         world.reset(None).unwrap();
         assert_eq!(world.warnings(), []);
@@ -389,4 +396,27 @@ velocity = [0, 0, -0.1]
         world.restore(&first).unwrap();
         assert_eq!((world.warnings(), world.unconverged_steps()), (Vec::new(), 0));
     }
+}
+
+#[test]
+fn a_world_that_records_its_steps_makes_the_same_ones() {
+    let scene = loaded(ALL).scene;
+    let [mut recorded, mut alone] = [(); 2].map(|()| world(ALL));
+    let system = recorded.engine().system();
+    let mut run = Run::new(&scene, system, PartialRun::new(&scene, system, String::new())).unwrap();
+    for step in 1..=60 {
+        recorded.step_of(&mut run).unwrap();
+        alone.step().unwrap();
+        assert_eq!((bytes(&recorded), recorded.steps()), (bytes(&alone), step));
+    }
+    assert_eq!(recorded.unconverged_steps(), alone.unconverged_steps());
+    assert_eq!(run.record().states(60).unwrap(), alone.engine().system().states());
+
+    // A step that fails is neither counted nor recorded.
+    let far = State::at_rest(Pose::at(DVec3::splat(f64::MAX)));
+    let far = State { linear: DVec3::splat(f64::MAX), ..far };
+    recorded.engine_mut().set_state(6, far).unwrap();
+    let error = recorded.step_of(&mut run).unwrap_err().to_string();
+    assert!(error.starts_with("step 60: "), "{error}");
+    assert_eq!((recorded.steps(), run.record().steps()), (60, 60));
 }
