@@ -460,6 +460,7 @@ fn joints_that_do_not_fit_are_refused() {
     let bar = links.bar(DVec3::ZERO, 0.0);
     let good = Joint::new("j", JointKind::Hinge, (None, bar), [Pose::IDENTITY; 2], Pose::IDENTITY);
     let motor = Motor { drive: Drive::Velocity(1.0), limit: 1.0 };
+    let none = JointResistance::default();
     let bad = [
         (Joint { child: 7, ..good.clone() }, "there is no body 7"),
         (Joint { parent: Some(bar), ..good.clone() }, "joint j: it connects a body to itself"),
@@ -476,6 +477,22 @@ fn joints_that_do_not_fit_are_refused() {
         (
             Joint { motor: Some(Motor { drive: Drive::Position(f64::NAN), ..motor }), ..good.clone() },
             "expected finite numbers",
+        ),
+        (
+            Joint { kind: JointKind::Ball, limits: Some([0.1, 1.0]), ..good.clone() },
+            "limits 0.1 to 1; expected 0 and an angle of at most π",
+        ),
+        (
+            Joint { resistance: JointResistance { friction: -1.0, ..none }, ..good.clone() },
+            "friction -1; expected a finite number, 0 or greater",
+        ),
+        (
+            Joint {
+                kind: JointKind::Ball,
+                resistance: JointResistance { damping: 1.0, ..none },
+                ..good.clone()
+            },
+            "only hinges and sliders have damping; take it out",
         ),
     ];
     for (joint, expected) in bad {

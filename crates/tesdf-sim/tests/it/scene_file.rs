@@ -513,3 +513,26 @@ fn a_mesh_is_encoded_with_the_rule_of_its_body() {
         assert!(error.contains(says), "{body}: {error}");
     }
 }
+
+#[test]
+fn a_scene_of_json_needs_a_list_of_bodies() {
+    let told = |bodies: serde_json::Value| {
+        let scene = serde_json::json!({ "time_step": 1e-3, "duration": 1, "bodies": bodies });
+        LoadedScene::of_json(scene, "scene.json").map(|_| ()).unwrap_err().to_string()
+    };
+    for (bodies, found) in [
+        ("null", "null"),
+        ("true", "true or false"),
+        ("3", "a number"),
+        ("\"a\"", "a string"),
+        ("{}", "an object"),
+    ] {
+        let told = told(bodies.parse().unwrap());
+        assert!(told.contains(&format!("bodies: {found}; expected a list of bodies")), "{told}");
+    }
+    let told = told(serde_json::json!([{ "name": "a" }, { "name": 3 }]));
+    assert!(told.contains("bodies: entry 1: ") && told.contains("scene.json"), "{told}");
+    let none = serde_json::json!({ "time_step": 1e-3, "duration": 1 });
+    let told = LoadedScene::of_json(none, "scene.json").map(|_| ()).unwrap_err().to_string();
+    assert!(told.contains("bodies: missing; expected a list of bodies"), "{told}");
+}

@@ -216,6 +216,17 @@ fn a_wrench_script_accelerates_a_free_body() {
 fn what_does_not_fit_is_refused_with_its_place() {
     let cases = [
         ("parent = \"wrist\"", "parent = \"arm\"", "left: there is no body arm; the bodies are floor, wrist"),
+        ("duration = 1.2", "duration = 1.2\ngravity = [0, 0, nan]", "expected finite numbers, in m/s²"),
+        (
+            "kind = \"slider\"",
+            "kind = \"slider\"\ncoordinate = inf",
+            "left: coordinate inf; expected a travel",
+        ),
+        (
+            "kind = \"slider\"",
+            "kind = \"ball\"\ncoordinate = 0.1",
+            "left: only hinges and sliders have a coordinate; take it out",
+        ),
         ("axis = [1, 0, 0]", "axis = [0, 0, 0]", "left: axis [0.0, 0.0, 0.0]; expected a direction"),
         ("kinematic = true", "kinematic = true\nmass = 1", "it is kinematic, so it needs no mass"),
         ("kinematic = true", "kinematic = true\nfixed = true", "it is fixed and kinematic; keep one"),
