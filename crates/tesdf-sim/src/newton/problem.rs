@@ -373,6 +373,63 @@ mod tests {
         assert!(unsolved <= 3, "{unsolved}");
     }
 
+    /// Four cubes of side 0.1 m that slide on the ground, on each other: each on eight points.
+    fn stack(random: &mut fastrand::Rng) -> (Vec<FreeBody>, Vec<Vector6<f64>>, Vec<Row>) {
+        let inertia = DMat3::from_diagonal(DVec3::splat(1.0 / 600.0));
+        let mass = MassProperties { mass: 1.0, center: DVec3::ZERO, inertia };
+        let free: Vec<_> = (0..4).map(|k| FreeBody::new(k, &mass, DQuat::IDENTITY)).collect();
+        let uneven = random.f64().powi(4);
+        let mut number = || random.f64() - 0.5;
+        let mut vector = || DVec3::new(number(), number(), number());
+        let slow = 0.1 * uneven;
+        let target = (0..4)
+            .map(|k| pack(DVec3::new(0.3, 0.1, -0.02 * k as f64 - 0.05) + slow * vector(), slow * vector()))
+            .collect();
+        let mut rows = Vec::new();
+        for k in 0..32 {
+            let (above, corner) = (
+                k / 8,
+                DVec3::new([-0.05, 0.05, -0.04, 0.045][k % 2 + k / 4 % 2 * 2], [-0.05, 0.05][k / 2 % 2], 0.0),
+            );
+            let (normal, gap) = ((DVec3::Z + 1e-3 * uneven * vector()).normalize(), 1e-5 * vector().x);
+            let arms = [corner - 0.05 * DVec3::Z, corner + 0.05 * DVec3::Z];
+            let side = |arm: DVec3, n: DVec3| pack(n, arm.cross(n));
+            let below = above.checked_sub(1).map(|below| (below, side(arms[1], -normal)));
+            rows.push(Row {
+                id: RowId::Joint(k),
+                sides: [Some((above, side(arms[0], normal))), below],
+                coupled: Vec::new(),
+                point: DVec3::ZERO,
+                arms,
+                gap,
+                relaxed_gap: gap,
+                stiffness: Stiffness::Absolute(30.0 / (H * H)),
+                bounds: PUSHES,
+                resistance: Resistance::Rigid,
+                friction: Some(Friction {
+                    normal,
+                    coefficient: 0.5,
+                    way: DVec3::ZERO,
+                    torsional: 0.0,
+                    turn: 0.0,
+                }),
+            });
+        }
+        (free, target, rows)
+    }
+
+    /// The last iteration must not bring friction beyond its limit: it would be cut there, and bodies
+    /// would have a momentum that nothing gave them.
+    #[test]
+    fn friction_that_is_cut_is_no_solution() {
+        for seed in 0..200 {
+            let (free, target, rows) = stack(&mut fastrand::Rng::with_seed(seed));
+            let found = problem(&free, &target, &rows).minimise(target.clone(), None);
+            assert!(found.converged, "seed {seed}");
+            check(&free, &target, &rows, &found).unwrap_or_else(|off| panic!("seed {seed}: {off}"));
+        }
+    }
+
     /// Joints, couplings, motors of a limited force, springs and given forces beside contacts.
     #[test]
     fn rows_of_all_kinds_keep_their_laws() {

@@ -387,8 +387,8 @@ impl<'a> Iterate<'a> {
         (((1.0 - shorter) * corrected.longest).min(1.0), centre)
     }
 
-    /// Goes along a direction. Returns the greatest way that torsional friction would bring beyond
-    /// its limit, m.
+    /// Goes along a direction. Returns the greatest way that friction would bring beyond its limit,
+    /// m.
     #[inline(always)]
     fn advance(&mut self, direction: &Direction, step: f64, limits: &Limits) -> f64 {
         let mut beyond = Lanes::ZERO;
@@ -409,9 +409,7 @@ impl<'a> Iterate<'a> {
             let size = (x * x + y * y).sqrt();
             let share = limit.zip(size, |limit, size| if size > limit { limit / size } else { 1.0 });
             state.friction = [x * share, y * share];
-            if slip.torsion.is_some() {
-                beyond = beyond.max((size - limit) / slip.scale);
-            }
+            beyond = beyond.max((size - limit) / slip.scale);
         }
         beyond.0.into_iter().fold(0.0, f64::max)
     }
