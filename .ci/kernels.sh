@@ -8,7 +8,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 
 stamp=crates/tesdf-gpu/kernels.sha256
-hash=$(find crates/tesdf-gpu/src/kernels crates/tesdf-gpu/src/cuda Cargo.lock .ci/nvrtc.sh -type f -print0 | LC_ALL=C sort -z |
+hash=$(find crates/tesdf-gpu/src/kernels crates/tesdf-gpu/src/cuda crates/tesdf-sim/src/newton/packed.rs \
+    crates/tesdf-sim/src/newton/interior/constants.rs Cargo.lock .ci/nvrtc.sh -type f -print0 | LC_ALL=C sort -z |
     xargs -0 sha256sum | sha256sum | cut -d ' ' -f 1)
 if [ "${1:-}" != --always ] && [ "$hash" = "$(cat "$stamp" 2>/dev/null)" ]; then
     echo "NVRTC has compiled these kernels: $stamp has their hash"

@@ -34,7 +34,7 @@ use crate::{classes, forces, pool};
 /// - mode: replaces the mode of the scene's detector: "node", "face", "exact" or "off".
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
-/// - device: where contacts are found, as in Scene.detect.
+/// - device: where contacts are found, as in Scene.detect; through CUDA also solved.
 /// - history: whether states and the summary are kept, which takes memory in each step.
 ///   Control loops that neither save nor view their steps go without.
 ///

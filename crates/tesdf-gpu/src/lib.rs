@@ -21,6 +21,7 @@ pub mod cuda;
 mod device;
 mod encode;
 mod error;
+mod islands;
 #[cfg(test)]
 mod kernel_tests;
 mod kernels;
@@ -39,4 +40,5 @@ pub use collide::{
 pub use device::{Device, DeviceArray, DeviceInfo, DeviceKind, Word, devices};
 pub use encode::{DeviceSampler, ROUNDING, SampleCounter, SampleCounts, SamplerLimits};
 pub use error::GpuError;
+pub use islands::IslandSolver;
 pub use query::{DeviceAnswers, WorldAnswer};

@@ -3,7 +3,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
 use serde::Serialize;
-use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene};
+use tesdf::collide::{CollideOptions, Contacts, Scene};
 use tesdf_gpu::{DeviceInfo, SharedDetector};
 use tesdf_sim::newton::Detect;
 
@@ -112,15 +112,7 @@ impl Device {
 
     /// A detector for the bodies of a simulation.
     pub fn into_detector(self) -> impl Detect {
-        BodyDetector(SharedDetector::new(self.inner))
-    }
-}
-
-struct BodyDetector(SharedDetector);
-
-impl Detect for BodyDetector {
-    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-        self.0.detect(scene, options).map_err(|e| CollideError::Device(e.to_string()))
+        SharedDetector::new(self.inner)
     }
 }
 

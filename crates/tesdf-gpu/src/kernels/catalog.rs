@@ -10,12 +10,13 @@ use cubecl::server::Handle;
 use cubecl_common::device::{DeviceId, ServiceId};
 use cubecl_environment::stream::StreamId;
 
-use super::{GROUP, bodies, cones, deform, detect, encode, narrow, pairs, query, report, scene};
+use super::{GROUP, bodies, cones, deform, detect, encode, interior, narrow, pairs, query, report, scene};
 use crate::kernels::counters::{self, CountersLaunch};
 use crate::kernels::deform::bounds::MovingLaunch;
 use crate::kernels::detect::candidates::{ItemsLaunch, PolygonsLaunch};
 use crate::kernels::detect::ordered_pair::OrderedPairsLaunch;
 use crate::kernels::encode::sampled::SamplesLaunch;
+use crate::kernels::interior::problem::{MemoryLaunch, ProblemsLaunch};
 use crate::kernels::narrow::exact::AskedExactLaunch;
 use crate::kernels::narrow::exchange::{LANES, Variant};
 use crate::kernels::narrow::frank_wolfe::AskedLaunch;
@@ -76,6 +77,7 @@ pub fn kernels(device: &Device, target: &Target) -> Vec<Named> {
     add_bodies(&mut all, device, target);
     add_narrow(&mut all, device, target);
     add_report(&mut all, device, target);
+    add_islands(&mut all, device, target);
     all
 }
 
@@ -184,6 +186,16 @@ fn add_report(all: &mut Vec<Named>, device: &Device, target: &Target) {
         Indirect report::reduce::members::fill, group, (pairs(), contacts(), counters(), words(), members());;
         Indirect report::reduce::selection::reduce, report::reduce::choice::GROUP,
             (contacts(), counters(), touching(), members(), rows(), contacts(), 1);;
+    );
+}
+
+/// Adds the kernel of the dynamics.
+fn add_islands(all: &mut Vec<Named>, device: &Device, target: &Target) {
+    let numbers = || buffer(2);
+    let problems = ProblemsLaunch::new(words(), words(), numbers());
+    let memory = MemoryLaunch::new(numbers(), numbers(), numbers(), numbers());
+    kernels!(all, device, target;
+        Direct interior::descend::descend, interior::problem::GROUP, (problems, memory);;
     );
 }
 

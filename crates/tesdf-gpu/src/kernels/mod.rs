@@ -18,6 +18,7 @@ pub mod deform;
 pub mod detect;
 pub mod encode;
 pub mod geometry;
+pub mod interior;
 pub mod narrow;
 pub mod pairs;
 pub mod query;

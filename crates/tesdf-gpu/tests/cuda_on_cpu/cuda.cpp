@@ -304,8 +304,10 @@ static void replace_all(std::string &text, const std::string &from, const std::s
 // Converts a kernel to C++, and adds a function that calls it with CUDA's pointers to its
 // arguments.
 static std::string as_cpp(std::string text) {
-    replace_all(text, "extern __shared__ __align__(4) char ", "[];", "char* const ", " = cuda_shared;");
-    replace_all(text, "extern __shared__ __align__(16) char ", "[];", "char* const ", " = cuda_shared;");
+    for (const char *bytes : {"4", "8", "16"}) {
+        const std::string shared = std::string("extern __shared__ __align__(") + bytes + ") char ";
+        replace_all(text, shared, "[];", "char* const ", " = cuda_shared;");
+    }
     for (const char *name : {"add", "min", "max"}) {
         const std::string atom = std::string("asm volatile(\"atom.relaxed.") + name + ".u32 %0, [%1], %2;\" : \"=r\"(result) : \"l\"(";
         replace_all(text, atom, ") );", std::string("result = cuda_fetch_") + name + "((uint32_t*)", ");");

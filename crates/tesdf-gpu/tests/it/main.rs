@@ -13,6 +13,8 @@ mod encode;
 mod flush_patches;
 mod hidden;
 mod inside_rules;
+#[cfg(feature = "cuda")]
+mod islands;
 mod normal_cones;
 #[cfg(feature = "cuda")]
 mod nvrtc;

@@ -131,7 +131,7 @@ impl Newton {
             bounces.left -= 1;
             return Ok(Meeting::After(soonest));
         }
-        let (velocities, forces) = self.impact(step, &places, &start, slow);
+        let (velocities, forces) = self.impact(step, &places, &start, slow)?;
         bounces.forces.add(&forces, h / step.whole);
         bounces.report.add(&step.report);
         bounces.left -= 1;
@@ -153,7 +153,7 @@ impl Newton {
         places: &[Place<'_>],
         start: &[Vector6<f64>],
         slow: f64,
-    ) -> (Vec<Vector6<f64>>, Forces) {
+    ) -> Result<(Vec<Vector6<f64>>, Forces), DynamicsError> {
         let (h, shortest) = (step.h, AT_ONCE * step.whole);
         let free: Vec<FreeBody> =
             step.free.iter().filter_map(|free| self.at_start(step, free.body)).collect();
@@ -181,13 +181,13 @@ impl Newton {
             let motion = Motion::new(&free, &velocities);
             let guess = Guess { velocities: &velocities, forces: None, known: None };
             let stopping = rows(&|_| 0.0);
-            let (stopped, compressing) = self.solve(step, &motion, &stopping, Gap::Position, guess);
+            let (stopped, compressing) = self.solve(step, &motion, &stopping, Gap::Position, guess)?;
             let opening = rows(&|place| match place.approach(&velocities, h) {
                 approach if approach > slow => place.restitution * approach,
                 _ => 0.0,
             });
             let (parted, opening) =
-                self.solve(step, &motion, &opening, Gap::Position, from_last(&stopped, &compressing));
+                self.solve(step, &motion, &opening, Gap::Position, from_last(&stopped, &compressing))?;
             let share = (way(&motion, &velocities, &stopped) / way(&motion, &stopped, &parted)).min(1.0);
             let between = |(w, u): (&Vector6<f64>, &Vector6<f64>)| w + share * (u - w);
             velocities = stopped.iter().zip(&parted).map(between).collect();
@@ -198,7 +198,7 @@ impl Newton {
             });
             all.add(&self.reactions(&stopping, &forces.collect::<Vec<_>>(), hit.len()), 1.0);
         }
-        (velocities, all)
+        Ok((velocities, all))
     }
 
     /// A free body in its orientation at the beginning of the step.

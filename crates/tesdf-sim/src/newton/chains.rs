@@ -14,7 +14,7 @@ use super::joints::predict;
 use super::rows::{Gap, Row, RowForce};
 use super::solve::from_last;
 use super::step::Step;
-use crate::{Coupling, Joint, JointKind, Mass, State, System};
+use crate::{Coupling, DynamicsError, Joint, JointKind, Mass, State, System};
 
 /// Maximum number of rounds for the joints alone. An error falls by three to ten in a round. A
 /// chain with an end of 20,000 times the mass of a link needs six; with four it flew apart.
@@ -70,7 +70,7 @@ impl Newton {
         iterate: &mut Iterate,
         of_joints: usize,
         start: &Start<'_>,
-    ) {
+    ) -> Result<(), DynamicsError> {
         let mut loads = None;
         for _ in 0..ROUNDS {
             let states = self.moved(step, &iterate.velocities);
@@ -92,9 +92,10 @@ impl Newton {
                 rows,
                 Gap::Position,
                 from_last(velocities, &iterate.forces),
-            );
+            )?;
             (iterate.velocities, iterate.forces) = solved;
         }
+        Ok(())
     }
 
     /// Whether joints that a shorter part may hold do not hold in a part of `time` seconds of the step

@@ -24,11 +24,13 @@
 //! plain corrections of limits that vanish slow down (`anderson.rs`). From most of these solutions
 //! the method of all comes to its end.
 mod anderson;
+pub mod constants;
 mod iteration;
 mod state;
 mod sum;
 
 use anderson::Anderson;
+use constants::{BALANCED, COLD, CONVEX, LAGGED, LEAST_GAP, WARM};
 use iteration::Iterate;
 use nalgebra::Vector6;
 use tesdf::base::elementary;
@@ -45,6 +47,9 @@ pub struct Interior<'a> {
     pub lines: &'a Lines,
 }
 
+/// Velocities of the bodies, and forces of the bundles.
+pub type Guess = (Vec<Vector6<f64>>, Vec<Forces>);
+
 /// Velocities and forces that were found.
 #[derive(Clone, Debug)]
 pub struct Solution {
@@ -58,6 +63,14 @@ pub struct Solution {
     pub residual: Residual,
     /// The fixed limits of friction; empty where they follow from the pushes.
     limits: Vec<Lanes>,
+}
+
+impl Solution {
+    /// One that a device has found.
+    pub fn of_device(velocity: Vec<Vector6<f64>>, forces: Vec<Forces>, iterations: u32) -> Self {
+        let (residual, limits) = (Residual::default(), Vec::new());
+        Self { velocity, forces, iterations, converged: true, residual, limits }
+    }
 }
 
 /// What limits friction.
@@ -83,34 +96,6 @@ impl Limits {
     }
 }
 
-/// How long a run tries.
-#[derive(Clone, Copy, Debug)]
-struct Effort {
-    /// Most iterations.
-    iterations: u32,
-    /// It ends after so many short steps in a row.
-    short_steps: u32,
-    /// The first of [`WIDTHS`].
-    width: usize,
-    /// It ends after an iteration that moves no body by more than this, m.
-    settled: f64,
-}
-
-/// An iterate is the solution when the last iteration moved no body by more than this, m.
-const SETTLED: f64 = 1e-10;
-/// The same for one that begins near the solution, where its first iterations are as short. With
-/// 0.1 nm, the friction of a stack did not end its creeping, which grew by 60 nm/s in a second.
-const SETTLED_WARM: f64 = 1e-12;
-
-/// From forces that may be nearly right.
-const WARM: Effort = Effort { iterations: 24, short_steps: 2, width: 1, settled: SETTLED_WARM };
-/// From no forces.
-const COLD: Effort = Effort { iterations: 30, short_steps: 3, width: 0, settled: SETTLED };
-/// The same without friction: convex, so short steps pass.
-const CONVEX: Effort = Effort { iterations: 100, short_steps: u32::MAX, width: 0, settled: SETTLED };
-/// With lagged limits.
-const LAGGED: Effort = Effort { iterations: 50, short_steps: u32::MAX, width: 0, settled: SETTLED };
-
 /// Most corrections of fixed limits of friction.
 const CORRECTIONS: u32 = 32;
 /// Fixed limits have settled when they differ from μ × push by less than this share, or their last
@@ -132,13 +117,9 @@ const NEARLY: f64 = 1e-4;
 /// The least gap as which they may be off, m.
 const LEAST_WARM: f64 = 1e-9;
 
-/// The least `a`, m: that with which the method converges, and that of the solution. The way by
-/// which a contact creeps in a step before it sticks.
-const WIDTHS: [f64; 2] = [1e-10, 1e-12];
-
 impl Interior<'_> {
     /// The solution, from velocities and forces that may be nearly right.
-    pub fn solve(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Forces>)>) -> Solution {
+    pub fn solve(&self, guess: Option<Guess>) -> Solution {
         if self.greatest_violation() == 0.0 {
             let (velocity, forces) =
                 (self.bodies.target.to_vec(), vec![Forces::default(); self.lines.bundles.len()]);
@@ -152,7 +133,7 @@ impl Interior<'_> {
         found
     }
 
-    fn iterate(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Forces>)>) -> Solution {
+    fn iterate(&self, guess: Option<Guess>) -> Solution {
         let mut iterations = 0;
         if let Some((velocity, forces)) = guess
             && let Some(centre) = self.centre_of(&velocity, &forces)
@@ -211,7 +192,8 @@ impl Interior<'_> {
         Solution { iterations, ..found }
     }
 
-    fn has_friction(&self) -> bool {
+    /// Whether a row has friction.
+    pub fn has_friction(&self) -> bool {
         self.lines.bundles.iter().any(|bundle| bundle.slip.is_some())
     }
 
@@ -227,7 +209,7 @@ impl Interior<'_> {
     }
 
     /// The greatest gap that is to be closed.
-    fn greatest_violation(&self) -> f64 {
+    pub fn greatest_violation(&self) -> f64 {
         let of_bundle = |(_, bundle, relative): (usize, &Bundle, [f64; 6])| bundle.violation(&relative);
         self.bundles(&self.bodies.target).map(of_bundle).fold(0.0, f64::max)
     }
@@ -308,7 +290,18 @@ impl Interior<'_> {
         self.lines.bundles.iter().map(square).sum::<f64>() / self.count_bounds().max(1) as f64
     }
 
-    fn count_bounds(&self) -> usize {
+    /// ν at the end.
+    pub fn least(&self) -> f64 {
+        self.mean_square(LEAST_GAP)
+    }
+
+    /// The way by which forces may be off with friction, m.
+    pub fn balanced(&self) -> f64 {
+        BALANCED[0] + BALANCED[1] * self.way(&self.bodies.target)
+    }
+
+    /// Number of bounds of all forces.
+    pub fn count_bounds(&self) -> usize {
         let of_bundle =
             |bundle: &Bundle| (0..bundle.rows().len()).map(|k| bundle.count_bounds(k)).sum::<usize>();
         self.lines.bundles.iter().map(of_bundle).sum()
@@ -343,7 +336,7 @@ impl Interior<'_> {
     /// ν for velocities and forces that are nearly right: that of the gaps that are left where a
     /// force is within its bounds, and of the ways by which forces are off. Returns `None` where
     /// these are not nearly right.
-    fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> Option<f64> {
+    pub fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Forces]) -> Option<f64> {
         let (mut products, mut count, mut worst) = (0.0, 0.0, LEAST_WARM);
         for (k, bundle, relative) in self.bundles(velocity) {
             let push = forces[k].push;

@@ -172,6 +172,11 @@ impl Inverse {
         Self { mass: 1.0 / matrix[(0, 0)], inertia }
     }
 
+    /// The inverses of the mass and of the inertia.
+    pub fn parts(&self) -> (f64, &Matrix3<f64>) {
+        (self.mass, &self.inertia)
+    }
+
     /// The velocity that a momentum gives.
     #[inline]
     pub fn times(&self, momentum: &Vector6<f64>) -> Vector6<f64> {

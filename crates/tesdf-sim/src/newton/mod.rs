@@ -54,6 +54,7 @@ mod linear;
 mod look;
 mod normals;
 mod options;
+mod packed;
 mod passing;
 mod pattern;
 mod problem;
@@ -97,6 +98,12 @@ pub trait Detect: Send + Sync {
     fn holds_all(&self, options: &CollideOptions) -> bool {
         options.mode != Mode::Node
     }
+
+    /// What solves the problems of islands; by default, the processor does.
+    #[doc(hidden)]
+    fn solver(&self) -> Option<&dyn internal::SolveIslands> {
+        None
+    }
 }
 
 impl<F> Detect for F
@@ -106,6 +113,16 @@ where
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
         self(scene, options)
     }
+}
+
+/// What a device has to know of the problems of islands. Not part of the interface.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::interior::constants;
+    pub use super::packed::{
+        BODIES, BODY, FORCES, GROUP, HEADER, NONE, Packed, REPORT, RUN, SCALARS, SolveIslands, UNBOUNDED,
+        field,
+    };
 }
 
 /// The built-in engine: Newton's method on a regularised convex problem of all contacts. A clone

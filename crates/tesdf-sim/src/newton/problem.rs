@@ -1,7 +1,7 @@
 //! The problem of one island: rows that may act, and those that a solution calls.
 use nalgebra::{Matrix6, Vector6};
 
-use super::interior::{Interior, Solution};
+use super::interior::{Guess, Interior, Solution};
 use super::line::{Bodies, Inverse, Lines, Placed};
 use super::pattern::Pattern;
 use super::rows::{Resistance, RowForce, RowId};
@@ -98,58 +98,103 @@ impl<'a> Problem<'a> {
     }
 
     /// Solves from `start`, where rows had the forces `guess`, if any.
-    ///
-    /// Most contacts stay open, so it begins with those that are nearly closed. It is repeated with
-    /// the others that its solution closes, until there are none.
     pub fn minimise(&self, start: Vec<Vector6<f64>>, guess: Option<&[RowForce]>) -> Minimum {
-        let Bodies { target, time_step, .. } = &self.bodies;
-        let gaps = |placed: &Placed<'_>| (placed.at(target, *time_step), placed.at(&start, *time_step));
-        let (free, at_start): (Vec<_>, Vec<_>) = self.rows.iter().map(gaps).unzip();
-        let change = |k: usize| (at_start[k] - free[k]).abs();
-        let of_all = NEAR_OF_ALL * (0..self.rows.len()).map(change).fold(0.0, f64::max);
-        let is_near =
-            |k: usize| !self.rows[k].row.is_contact() || at_start[k] <= f64::max(NEAR * change(k), of_all);
-        let has_force = |k: usize| guess.is_some_and(|guess| guess[k].along != 0.0);
-        let may_act = |k: &usize| !is_given(&self.rows[*k]) && (has_force(*k) || is_near(*k));
-        let mut acts: Vec<bool> = (0..self.rows.len()).map(|k| may_act(&k)).collect();
-        let mut added: Vec<usize> = (0..self.rows.len()).filter(|&k| acts[k]).collect();
-        let mut lines = Lines::default();
-        let mut forces = match guess {
-            Some(guess) => guess.to_vec(),
-            None => vec![RowForce::default(); self.rows.len()],
-        };
-        let mut guess = guess.map(|_| start);
-        let mut iterations = 0;
+        let mut search = Minimisation::new(self, start, guess);
         loop {
-            lines.add(&added, &self.rows, &self.bodies, &self.pattern);
-            let interior = Interior { bodies: &self.bodies, pattern: &self.pattern, lines: &lines };
-            let guessed = guess.map(|velocity| (velocity, lines.forces(|k| (self.rows[k].row, forces[k]))));
-            let found = interior.solve(guessed);
-            iterations += found.iterations;
-            for (bundle, of_bundle) in lines.bundles.iter().zip(&found.forces) {
-                for (lane, &k) in bundle.rows().iter().enumerate() {
-                    bundle.tell(lane, self.rows[k].row, of_bundle, &mut forces[k]);
-                }
+            let found = search.interior().solve(search.guess());
+            if let Some(minimum) = search.next(found) {
+                return minimum;
             }
-            let mut closed = 0.0;
-            added.clear();
-            for (k, placed) in self.rows.iter().enumerate().filter(|(k, row)| !acts[*k] && !is_given(row)) {
-                let now = placed.at(&found.velocity, *time_step);
-                if now < f64::max(NEAR * (now - free[k]).abs(), CLOSED) {
-                    added.push(k);
-                }
-                closed = f64::max(closed, -now);
-            }
-            if closed <= CLOSED || !found.velocity.iter().all(|v| v.norm().is_finite()) {
-                for (force, placed) in forces.iter_mut().zip(&self.rows).filter(|(_, row)| is_given(row)) {
-                    *force = RowForce { along: placed.row.bounds[0], ..RowForce::default() };
-                }
-                let Solution { velocity, converged, residual, .. } = found;
-                return Minimum { velocity, forces, iterations, converged, residual };
-            }
-            added.iter().for_each(|&k| acts[k] = true);
-            guess = (closed < NEARLY_OPEN && found.converged).then_some(found.velocity);
         }
+    }
+}
+
+/// The search of a solution in rounds.
+///
+/// Most contacts stay open, so it begins with those that are nearly closed. It is repeated with
+/// the others that its solution closes, until there are none.
+pub struct Minimisation<'p, 'a> {
+    problem: &'p Problem<'a>,
+    /// The gap of each row without forces, m.
+    free: Vec<f64>,
+    /// Whether each row is in `lines`.
+    acts: Vec<bool>,
+    lines: Lines,
+    /// What each row does.
+    forces: Vec<RowForce>,
+    /// Velocities that are nearly right with `forces`.
+    near: Option<Vec<Vector6<f64>>>,
+    iterations: u32,
+}
+
+impl<'p, 'a> Minimisation<'p, 'a> {
+    /// As [`Problem::minimise`].
+    pub fn new(problem: &'p Problem<'a>, start: Vec<Vector6<f64>>, guess: Option<&[RowForce]>) -> Self {
+        let Bodies { target, time_step, .. } = &problem.bodies;
+        let rows = &problem.rows;
+        let gaps = |placed: &Placed<'_>| (placed.at(target, *time_step), placed.at(&start, *time_step));
+        let (free, at_start): (Vec<_>, Vec<_>) = rows.iter().map(gaps).unzip();
+        let change = |k: usize| (at_start[k] - free[k]).abs();
+        let of_all = NEAR_OF_ALL * (0..rows.len()).map(change).fold(0.0, f64::max);
+        let is_near =
+            |k: usize| !rows[k].row.is_contact() || at_start[k] <= f64::max(NEAR * change(k), of_all);
+        let has_force = |k: usize| guess.is_some_and(|guess| guess[k].along != 0.0);
+        let may_act = |k: usize| !is_given(&rows[k]) && (has_force(k) || is_near(k));
+        let acts: Vec<bool> = (0..rows.len()).map(may_act).collect();
+        let forces = guess.map_or_else(|| vec![RowForce::default(); rows.len()], <[_]>::to_vec);
+        let (near, lines) = (guess.map(|_| start), Lines::default());
+        let mut search = Self { problem, free, acts, lines, forces, near, iterations: 0 };
+        let first: Vec<usize> = (0..rows.len()).filter(|&k| search.acts[k]).collect();
+        search.add(&first);
+        search
+    }
+
+    fn add(&mut self, rows: &[usize]) {
+        let Problem { bodies, rows: all, pattern } = self.problem;
+        self.lines.add(rows, all, bodies, pattern);
+    }
+
+    /// The rows of this round.
+    pub fn interior(&self) -> Interior<'_> {
+        Interior { bodies: &self.problem.bodies, pattern: &self.problem.pattern, lines: &self.lines }
+    }
+
+    /// Velocities and forces that may be nearly right.
+    pub fn guess(&self) -> Option<Guess> {
+        let of_row = |k: usize| (self.problem.rows[k].row, self.forces[k]);
+        self.near.clone().map(|velocity| (velocity, self.lines.forces(of_row)))
+    }
+
+    /// Ends the round with the solution of its rows. Returns the minimum, or `None` before another
+    /// round.
+    pub fn next(&mut self, found: Solution) -> Option<Minimum> {
+        let Problem { rows, bodies, .. } = self.problem;
+        self.iterations += found.iterations;
+        for (bundle, of_bundle) in self.lines.bundles.iter().zip(&found.forces) {
+            for (lane, &k) in bundle.rows().iter().enumerate() {
+                bundle.tell(lane, rows[k].row, of_bundle, &mut self.forces[k]);
+            }
+        }
+        let (mut closed, mut added) = (0.0, Vec::new());
+        for (k, placed) in rows.iter().enumerate().filter(|(k, row)| !self.acts[*k] && !is_given(row)) {
+            let now = placed.at(&found.velocity, bodies.time_step);
+            if now < f64::max(NEAR * (now - self.free[k]).abs(), CLOSED) {
+                added.push(k);
+            }
+            closed = f64::max(closed, -now);
+        }
+        if closed <= CLOSED || !found.velocity.iter().all(|v| v.norm().is_finite()) {
+            let mut forces = std::mem::take(&mut self.forces);
+            for (force, placed) in forces.iter_mut().zip(rows).filter(|(_, row)| is_given(row)) {
+                *force = RowForce { along: placed.row.bounds[0], ..RowForce::default() };
+            }
+            let Solution { velocity, converged, residual, .. } = found;
+            return Some(Minimum { velocity, forces, iterations: self.iterations, converged, residual });
+        }
+        added.iter().for_each(|&k| self.acts[k] = true);
+        self.add(&added);
+        self.near = (closed < NEARLY_OPEN && found.converged).then_some(found.velocity);
+        None
     }
 }
 

@@ -1,4 +1,6 @@
 //! Minimises the problems of all islands.
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
@@ -9,10 +11,11 @@ use super::integrate::unpack;
 use super::islands::{Island, islands};
 use super::kept::Known;
 use super::line::Placed;
-use super::problem::{Minimum, Problem};
+use super::packed::{Packed, SolveIslands};
+use super::problem::{Minimisation, Minimum, Problem};
 use super::rows::{Gap, Resistance, Row, RowForce, carry, matches};
 use super::step::Step;
-use crate::Residual;
+use crate::{DynamicsError, Residual};
 
 /// Bodies are wild when they are faster than what moves them by the first factor, or by the second
 /// one where the solution did not converge. In a chain of joints from 10 kg to 10 g, such a
@@ -60,6 +63,33 @@ impl Guess<'_> {
     }
 }
 
+/// What a minimisation is of.
+struct Task<'a> {
+    motion: &'a Motion,
+    rows: &'a [Row],
+    /// Rows that part bodies in place of those that were found, by their numbers.
+    parting: BTreeMap<usize, Row>,
+    gap: Gap,
+    guess: Guess<'a>,
+}
+
+/// The problem of an island, and what its search begins with.
+struct Posed<'a> {
+    problem: Problem<'a>,
+    /// Velocities of the bodies of the island.
+    start: Vec<Vector6<f64>>,
+    /// What each row does; `None` where nothing is known.
+    forces: Option<Vec<RowForce>>,
+    /// The greatest velocity that a row asks for, m/s or rad/s.
+    asked: f64,
+}
+
+impl Posed<'_> {
+    fn search(&self) -> Minimisation<'_, '_> {
+        Minimisation::new(&self.problem, self.start.clone(), self.forces.as_deref())
+    }
+}
+
 impl Newton {
     /// Minimises the problem of every island from `guess`. A body without rows keeps its target
     /// velocity.
@@ -70,17 +100,32 @@ impl Newton {
         rows: &[Row],
         gap: Gap,
         guess: Guess<'_>,
-    ) -> (Vec<Vector6<f64>>, Vec<RowForce>) {
+    ) -> Result<(Vec<Vector6<f64>>, Vec<RowForce>), DynamicsError> {
         let islands = islands(step.free.len(), rows);
-        let minimum = |island: &Island| match guess.solved(step, island, rows, gap) {
-            Some(solved) => solved,
-            None => self.solve_island(step, motion, island, rows, gap, guess),
-        };
-        // One thread computes each minimum, and they are collected in order: the bits do not depend
-        // on the number of threads.
-        let minima: Vec<Minimum> = match islands.len() > 1 && rows.len() >= ON_ONE_THREAD {
-            true => islands.par_iter().map(minimum).collect(),
-            false => islands.iter().map(minimum).collect(),
+        let parts =
+            |(_, row): &(usize, &Row)| matches!(gap, Gap::Position) && row.resistance == Resistance::Parting;
+        let parting = rows.iter().enumerate().filter(parts).map(|(k, row)| (k, row.parting())).collect();
+        let task = Task { motion, rows, parting, gap, guess };
+        let minima = match self.detector.solver() {
+            Some(solver) if rows.len() >= solver.least_rows() => {
+                self.minima_by(solver, step, &task, &islands)?
+            }
+            _ => {
+                let minimum = |island: &Island| match guess.solved(step, island, rows, gap) {
+                    Some(solved) => solved,
+                    None => {
+                        let posed = self.pose(step, &task, island);
+                        let found = posed.problem.minimise(posed.start.clone(), posed.forces.as_deref());
+                        self.tamed(step, island, rows, posed, found)
+                    }
+                };
+                // One thread computes each minimum, and they are collected in order: the bits do not
+                // depend on the number of threads.
+                match islands.len() > 1 && rows.len() >= ON_ONE_THREAD {
+                    true => islands.par_iter().map(minimum).collect::<Vec<_>>(),
+                    false => islands.iter().map(minimum).collect(),
+                }
+            }
         };
         let (mut velocities, mut forces) = (motion.target.clone(), vec![RowForce::default(); rows.len()]);
         let report = &mut step.report;
@@ -94,38 +139,69 @@ impl Newton {
             report.residual = report.residual.max(minimum.residual);
         }
         report.iterations += slowest;
-        (velocities, forces)
+        Ok((velocities, forces))
     }
 
-    fn solve_island(
+    /// The minima of all islands, whose rounds `solver` solves together.
+    fn minima_by(
         &self,
+        solver: &dyn SolveIslands,
         step: &Step,
-        motion: &Motion,
-        island: &Island,
-        rows: &[Row],
-        gap: Gap,
-        guess: Guess<'_>,
-    ) -> Minimum {
-        // Rows that part bodies in place of those that were found.
-        let mut parting = Vec::new();
-        if matches!(gap, Gap::Position) {
-            let parts =
-                island.rows.iter().map(|&k| &rows[k]).filter(|row| row.resistance == Resistance::Parting);
-            parting.extend(parts.map(Row::parting));
+        task: &Task<'_>,
+        islands: &[Island],
+    ) -> Result<Vec<Minimum>, DynamicsError> {
+        let known = islands.iter().map(|island| task.guess.solved(step, island, task.rows, task.gap));
+        let mut minima: Vec<Option<Minimum>> = known.collect();
+        let pose = |(island, known): (&Island, &Option<Minimum>)| match known {
+            Some(_) => None,
+            None => Some(self.pose(step, task, island)),
+        };
+        let posed: Vec<Option<Posed<'_>>> = islands.par_iter().zip(&minima).map(pose).collect();
+        let open = posed.iter().enumerate().filter_map(|(k, posed)| Some((k, posed.as_ref()?)));
+        let mut searches: Vec<_> = open.map(|(k, posed)| (k, posed.search())).collect();
+        while !searches.is_empty() {
+            let mut packed = Packed::default();
+            let add = |(_, search): &(usize, Minimisation<'_, '_>)| {
+                packed.add(&search.interior(), search.guess().as_ref())
+            };
+            let numbers: Vec<Option<usize>> = searches.iter().map(add).collect();
+            let is_worth_it = packed.rows >= solver.least_rows().max(1);
+            let results = is_worth_it.then(|| solver.solve(&packed)).transpose()?;
+            let solution = |(number, (_, search)): (&Option<usize>, &(usize, Minimisation<'_, '_>))| {
+                let of_device = results.as_ref().zip(*number);
+                let found = of_device.and_then(|(results, number)| packed.solution(number, results));
+                found.unwrap_or_else(|| search.interior().solve(search.guess()))
+            };
+            let solutions: Vec<_> = numbers.par_iter().zip(&searches).map(solution).collect();
+            let mut solutions = solutions.into_iter();
+            searches.retain_mut(|(k, search)| {
+                minima[*k] = solutions.next().and_then(|solution| search.next(solution));
+                minima[*k].is_none()
+            });
         }
-        let mut parting = parting.iter();
+        drop(searches);
+        let tamed = |((island, posed), minimum): ((&Island, Option<Posed<'_>>), Option<Minimum>)| match posed
+        {
+            Some(posed) => Some(self.tamed(step, island, task.rows, posed, minimum?)),
+            None => minimum,
+        };
+        Ok(islands.iter().zip(posed).zip(minima).filter_map(tamed).collect())
+    }
+
+    /// The problem of an island.
+    fn pose<'a>(&self, step: &Step, task: &'a Task<'a>, island: &Island) -> Posed<'a> {
+        let Task { motion, rows, parting, gap, guess } = task;
         // Every free body of an island's rows is in `island.bodies`, which is sorted.
         let place = |body: usize| island.bodies.partition_point(|b| *b < body);
         let placed = |&k: &usize| {
             let row = &rows[k];
-            let (row, gap) = match (gap, row.resistance) {
-                (Gap::Position, Resistance::Parting) => (parting.next().unwrap_or(row), row.gap),
-                (Gap::Position, _) => (row, row.gap),
-                (Gap::Relaxed, _) => (row, row.relaxed_gap),
+            let gap = match gap {
+                Gap::Position => row.gap,
+                Gap::Relaxed => row.relaxed_gap,
             };
             let bodies = row.sides.map(|side| side.map(|(body, _)| place(body)));
             let coupled = row.coupled.iter().map(|(body, _)| place(*body)).collect();
-            Placed { row, bodies, coupled, gap, resistance: row.resistance }
+            Placed { row: parting.get(&k).unwrap_or(row), bodies, coupled, gap, resistance: row.resistance }
         };
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
         let inertia: Vec<_> = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
@@ -137,10 +213,20 @@ impl Newton {
         // An open contact asks for nothing.
         let asks = |placed: &Placed<'_>| if placed.row.is_contact() { -placed.gap } else { placed.gap.abs() };
         let asked = placed.iter().map(|placed| asks(placed) / step.h).fold(0.0, f64::max);
-        let problem = Problem::new(inertia, of(&motion.target), placed, step.h);
-        let minimum = problem.minimise(start.clone(), forces.as_deref());
-        if !self.is_wild(step, island, rows, asked, problem.target(), &minimum) {
-            return minimum;
+        Posed { problem: Problem::new(inertia, of(&motion.target), placed, step.h), start, forces, asked }
+    }
+
+    /// The minimum that was found; where its bodies are wild, that of soft contacts.
+    fn tamed(
+        &self,
+        step: &Step,
+        island: &Island,
+        rows: &[Row],
+        Posed { problem, start, asked, .. }: Posed<'_>,
+        found: Minimum,
+    ) -> Minimum {
+        if !self.is_wild(step, island, rows, asked, problem.target(), &found) {
+            return found;
         }
         let soft = problem.softened();
         let minimum = soft.minimise(start, None);

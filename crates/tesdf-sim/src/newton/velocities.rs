@@ -89,12 +89,12 @@ impl Newton {
                 kept.as_deref().and_then(|kept| plain.stiffened(&loads(&first, kept), &found_at, &from));
             let motion = of_kept.as_ref().unwrap_or(&plain);
             let guess = Guess { velocities: start, forces: kept.as_deref(), known: known.as_ref() };
-            let (mut velocities, mut forces) = self.solve(step, motion, &first, Gap::Position, guess);
+            let (mut velocities, mut forces) = self.solve(step, motion, &first, Gap::Position, guess)?;
             let stiffened = plain.stiffened(&loads(&first, &forces), &found_at, &from);
             let again = stiffened.as_ref().unwrap_or(&plain);
             if again.differs(motion, &plain) {
                 (velocities, forces) =
-                    self.solve(step, again, &first, Gap::Position, from_last(&velocities, &forces));
+                    self.solve(step, again, &first, Gap::Position, from_last(&velocities, &forces))?;
             }
             if !far.closes(&velocities, step.h) {
                 break (found, first, far, velocities, forces, stiffened);
@@ -153,7 +153,7 @@ impl Newton {
                     let motion = stiffened.as_ref().unwrap_or(&plain);
                     let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
                     let (_, forces) =
-                        self.solve(step, motion, &next, Gap::Position, from_last(&velocities, &guess));
+                        self.solve(step, motion, &next, Gap::Position, from_last(&velocities, &guess))?;
                     held = hit.held(&next, &forces, |row| step.stays(row));
                     continue;
                 }
@@ -171,7 +171,7 @@ impl Newton {
                     let guess = carry_rows(later.as_ref().unwrap_or(&first), &forces, &next);
                     let rows = &*later.insert(next);
                     let guess = from_last(&velocities, &guess);
-                    (velocities, forces) = self.solve(step, motion, rows, Gap::Position, guess);
+                    (velocities, forces) = self.solve(step, motion, rows, Gap::Position, guess)?;
                     if !far.closes(&velocities, step.h) {
                         break;
                     }
@@ -191,7 +191,7 @@ impl Newton {
         let rows = later.unwrap_or(first);
         let of_joints = rows.len() - joints.len();
         let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
-        self.close_joints(step, &mut solved, of_joints, &from);
+        self.close_joints(step, &mut solved, of_joints, &from)?;
         let Iterate { rows, velocities, forces, plain, .. } = &solved;
         let differs = rows.iter().any(|row| row.relaxed_gap != row.gap);
         let relaxed = differs.then(|| {
@@ -199,6 +199,7 @@ impl Newton {
             let guess = Guess { known: known.as_ref(), ..from_last(velocities, forces) };
             self.solve(step, solved.motion(), rows, Gap::Relaxed, guess)
         });
+        let relaxed = relaxed.transpose()?;
         // Without corrections of poses, both are the same.
         let (carried, carrying) = relaxed.as_ref().map_or((velocities, forces), |(v, f)| (v, f));
         if far.closes(velocities, step.h) || far.closes(carried, step.h) {

@@ -276,7 +276,8 @@ fn elementary_functions_are_those_of_the_library() {
 #[test]
 fn kernels_mirror_the_files_whose_names_they_have() {
     let krate = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let [library, collide] = ["src", "src/collide"].map(|folder| krate.join(folder));
+    let [library, collide, dynamics] =
+        ["src", "src/collide", "../tesdf-sim/src/newton"].map(|folder| krate.join(folder));
     let kernels = krate.join("../tesdf-gpu/src/kernels");
     let (mut open, mut twins) = (vec![kernels.clone()], 0);
     while let Some(folder) = open.pop() {
@@ -284,7 +285,8 @@ fn kernels_mirror_the_files_whose_names_they_have() {
             let path = entry.expect("an entry").path();
             let name = path.strip_prefix(&kernels).expect("of the folder").to_path_buf();
             if path.is_dir() {
-                assert!(library.join(&name).is_dir() || collide.join(&name).is_dir(), "{}", name.display());
+                let is_room = [&library, &collide, &dynamics].iter().any(|room| room.join(&name).is_dir());
+                assert!(is_room, "{}", name.display());
                 open.push(path);
                 continue;
             }

@@ -1,5 +1,4 @@
 //! Devices of the crate `tesdf-gpu`.
-use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene};
 use tesdf::encode::Sampler;
 use tesdf_gpu::{DeviceSampler, SharedDetector};
 use tesdf_sim::newton::Detect;
@@ -31,16 +30,8 @@ impl Device {
         Box::new(DeviceSampler::new(self.0))
     }
 
-    /// A detector that finds contacts on this device.
+    /// A detector that finds contacts on this device, and solves islands there.
     pub fn into_detector(self) -> impl Detect {
-        DeviceDetector(SharedDetector::new(self.0))
-    }
-}
-
-struct DeviceDetector(SharedDetector);
-
-impl Detect for DeviceDetector {
-    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-        self.0.detect(scene, options).map_err(|e| CollideError::Device(e.to_string()))
+        SharedDetector::new(self.0)
     }
 }

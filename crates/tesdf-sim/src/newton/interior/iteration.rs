@@ -2,46 +2,17 @@
 use nalgebra::Vector6;
 use tesdf::base::elementary;
 
+use super::constants::{
+    CLOSED, Effort, FEW, FINE, FIRST, FREEZE, LEAST_CENTRING, LENGTHENS, LONG, PROXIMAL, SHORT, SHORTER,
+    WIDTHS,
+};
 use super::state::{State, bounded};
 use super::sum::Sum;
-use super::{Effort, Interior, Limits, Solution, WIDTHS};
+use super::{Interior, Limits, Solution};
 use crate::Residual;
 use crate::newton::lanes::{Lanes, WIDTH, two};
 use crate::newton::line::{Bundle, Forces, Slips, dot};
 use crate::newton::linear::{BlockMatrix, Factor};
-
-/// Rows without bounds are at least as soft in the matrix, in the units of rows (the proximal
-/// method of multipliers: Rockafellar, *Augmented Lagrangians and applications of the proximal
-/// point algorithm*, Math. Oper. Res. 1976). What they leave is the same. With the 1e-13 of rigid
-/// rows in the matrix, rounding was as great as the numbers: the iterations for three joints from
-/// 10 kg to 10 g, a linear problem, grew to 1e23 m/s, or took up to 100. A step of that scene took
-/// 631 of them, with 1e-12 63, and from 1e-9 to 1e-7 47.
-const PROXIMAL: f64 = 1e-9;
-/// Lagged limits stay once the root of ν is below this gap, m.
-const FREEZE: f64 = 1e-5;
-/// An iterate is the solution when the last iteration leaves no more of a gap, m.
-const CLOSED: f64 = 1e-10;
-/// With friction, the forces are off by less than this way, and this share of the way without rows.
-const BALANCED: [f64; 2] = [1e-8, 1e-6];
-/// ν ends at the square of this gap, m, ...
-const LEAST_GAP: f64 = 1e-11;
-/// ... or below this multiple of it, 0.1 nm squared. A box at rest is 1e-16 m above its rigid place
-/// then, and nothing pushes it across a gap of nanometres.
-const FEW: f64 = 1e2;
-/// ν begins with the square of this multiple of the greatest gap that is to be closed.
-const FIRST: f64 = 3.0;
-/// Most iterations with the second one of [`WIDTHS`].
-const FINE: u32 = 4;
-/// The least share of ν that an iteration aims at.
-const LEAST_CENTRING: f64 = 1e-6;
-/// A step that goes all the way to a bound is shortened by this share, and less where the predictor
-/// is nearly free of bounds.
-const SHORTER: f64 = 0.01;
-/// Steps below are short, and above long.
-const SHORT: f64 = 0.3;
-const LONG: f64 = 0.7;
-/// Gondzio's correction is taken where it lengthens the step by this factor.
-const LENGTHENS: f64 = 1.05;
 
 /// What an iteration knows of a bundle.
 #[derive(Clone, Copy, Debug, Default)]
@@ -132,7 +103,7 @@ impl<'a> Iterate<'a> {
             State::new(bundle, &relative, centre, &forces[k])
         };
         let states: Vec<_> = of.bundles(&velocity).map(state).collect();
-        let (bounds, least, count) = (of.count_bounds(), of.mean_square(LEAST_GAP), states.len());
+        let (bounds, least, count) = (of.count_bounds(), of.least(), states.len());
         Self {
             of,
             velocity,
@@ -149,8 +120,7 @@ impl<'a> Iterate<'a> {
 
     /// From the velocities that the springs of all rows would lead to.
     pub fn cold(of: &'a Interior<'a>) -> Self {
-        let centre =
-            f64::max(elementary::powi(FIRST * of.greatest_violation(), 2), of.mean_square(LEAST_GAP));
+        let centre = f64::max(elementary::powi(FIRST * of.greatest_violation(), 2), of.least());
         let none = vec![Forces::default(); of.lines.bundles.len()];
         let mut matrix = BlockMatrix::symmetric(of.pattern, of.bodies.inertia.to_vec());
         let mut momentum: Vec<_> =
@@ -444,7 +414,7 @@ impl<'a> Iterate<'a> {
     fn descend_with_baseline(mut self, mut limits: Limits, effort: Effort) -> Solution {
         let has_friction = self.of.has_friction();
         let [freeze, few] = [self.of.mean_square(FREEZE), FEW * self.least];
-        let balanced = BALANCED[0] + BALANCED[1] * self.of.way(&self.of.bodies.target);
+        let balanced = self.of.balanced();
         let (mut width, mut short_steps, mut left) = (effort.width, 0, effort.iterations);
         let mut directions = [(); 3].map(|()| Direction::default());
         // The solution with the first width.
