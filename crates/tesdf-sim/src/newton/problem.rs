@@ -235,6 +235,24 @@ mod tests {
         (0..5).map(&mut body).collect()
     }
 
+    /// A contact without friction.
+    fn contact_row(k: usize, bodies: [Option<usize>; 2], arms: [DVec3; 2], normal: DVec3, gap: f64) -> Row {
+        let side = |side: usize, n: DVec3| bodies[side].map(|body| (body, pack(n, arms[side].cross(n))));
+        Row {
+            id: RowId::Joint(k),
+            sides: [side(0, normal), side(1, -normal)],
+            coupled: Vec::new(),
+            point: DVec3::ZERO,
+            arms,
+            gap,
+            relaxed_gap: gap,
+            stiffness: Stiffness::Absolute(30.0 / (H * H)),
+            bounds: PUSHES,
+            resistance: Resistance::Rigid,
+            friction: None,
+        }
+    }
+
     /// Contacts at random points with random normals, most of them open when nothing moves. The
     /// bodies are side by side.
     fn contacts(count: usize, coefficient: f64, random: &mut fastrand::Rng) -> Vec<Row> {
@@ -243,27 +261,11 @@ mod tests {
         let mut contact = |k: usize| {
             let (a, b, normal, point) = (k % 5, (k + 1) % 5, vector().normalize(), vector());
             let arms = [a, b].map(|body| point - centres[body]);
-            let side = |body, arm: DVec3, n: DVec3| Some((body, pack(n, arm.cross(n))));
-            let gap = 0.1 * H * vector().x.abs();
-            Row {
-                id: RowId::Joint(k),
-                sides: [side(a, arms[0], normal), side(b, arms[1], -normal).filter(|_| !k.is_multiple_of(3))],
-                coupled: Vec::new(),
-                point: DVec3::ZERO,
-                arms,
-                gap,
-                relaxed_gap: gap,
-                stiffness: Stiffness::Absolute(30.0 / (H * H)),
-                bounds: PUSHES,
-                resistance: Resistance::Rigid,
-                friction: (coefficient > 0.0).then_some(Friction {
-                    normal,
-                    coefficient,
-                    way: (0.01 * H * vector()).reject_from_normalized(normal),
-                    torsional: 0.0,
-                    turn: 0.0,
-                }),
-            }
+            let bodies = [Some(a), Some(b).filter(|_| !k.is_multiple_of(3))];
+            let row = contact_row(k, bodies, arms, normal, 0.1 * H * vector().x.abs());
+            let way = (0.01 * H * vector()).reject_from_normalized(normal);
+            let friction = Friction { normal, coefficient, way, torsional: 0.0, turn: 0.0 };
+            Row { friction: (coefficient > 0.0).then_some(friction), ..row }
         };
         (0..count).map(&mut contact).collect()
     }
@@ -438,33 +440,15 @@ mod tests {
             );
             let (normal, gap) = ((DVec3::Z + 1e-3 * uneven * vector()).normalize(), 1e-5 * vector().x);
             let arms = [corner - 0.05 * DVec3::Z, corner + 0.05 * DVec3::Z];
-            let side = |arm: DVec3, n: DVec3| pack(n, arm.cross(n));
-            let below = above.checked_sub(1).map(|below| (below, side(arms[1], -normal)));
-            rows.push(Row {
-                id: RowId::Joint(k),
-                sides: [Some((above, side(arms[0], normal))), below],
-                coupled: Vec::new(),
-                point: DVec3::ZERO,
-                arms,
-                gap,
-                relaxed_gap: gap,
-                stiffness: Stiffness::Absolute(30.0 / (H * H)),
-                bounds: PUSHES,
-                resistance: Resistance::Rigid,
-                friction: Some(Friction {
-                    normal,
-                    coefficient: 0.5,
-                    way: DVec3::ZERO,
-                    torsional: 0.0,
-                    turn: 0.0,
-                }),
-            });
+            let row = contact_row(k, [Some(above), above.checked_sub(1)], arms, normal, gap);
+            let friction = Friction { normal, coefficient: 0.5, way: DVec3::ZERO, torsional: 0.0, turn: 0.0 };
+            rows.push(Row { friction: Some(friction), ..row });
         }
         (free, target, rows)
     }
 
-    /// The last iteration must not bring friction beyond its limit: it would be cut there, and bodies
-    /// would have a momentum that nothing gave them.
+    /// The last iteration must not bring friction beyond its limit: it would be cut there, and
+    /// bodies would have a momentum that nothing gave them.
     #[test]
     fn friction_that_is_cut_is_no_solution() {
         for seed in 0..200 {

@@ -383,9 +383,7 @@ velocity = [0, 0, -0.1]
         }
         assert_eq!(world.warnings(), run.warnings);
         assert_eq!(world.unconverged_steps(), run.unconverged_steps);
-        let system = recorded.engine().system();
-        let mut record =
-            Run::new(&loaded.scene, system, PartialRun::new(&loaded.scene, system, String::new())).unwrap();
+        let mut record = run_of(&loaded, &recorded);
         (0..run.steps).for_each(|_| recorded.step_of(&mut record).unwrap());
         assert_eq!(recorded.warnings(), run.warnings);
         let last = world.snapshot();
@@ -398,12 +396,16 @@ velocity = [0, 0, -0.1]
     }
 }
 
+/// A run that records the steps of a world.
+fn run_of(loaded: &LoadedScene, world: &World) -> Run {
+    let system = world.engine().system();
+    Run::new(&loaded.scene, system, PartialRun::new(&loaded.scene, system, String::new())).unwrap()
+}
+
 #[test]
 fn a_world_that_records_its_steps_makes_the_same_ones() {
-    let scene = loaded(ALL).scene;
     let [mut recorded, mut alone] = [(); 2].map(|()| world(ALL));
-    let system = recorded.engine().system();
-    let mut run = Run::new(&scene, system, PartialRun::new(&scene, system, String::new())).unwrap();
+    let mut run = run_of(&loaded(ALL), &recorded);
     for step in 1..=60 {
         recorded.step_of(&mut run).unwrap();
         alone.step().unwrap();
