@@ -138,6 +138,14 @@ struct Search<'a> {
     waiting: Vec<usize>,
 }
 
+/// What a search has to do.
+enum Next {
+    /// These parts, with their lower bounds.
+    Batch(Vec<(f64, Open)>),
+    /// Nothing: the lower bound of what is left.
+    Done(f64),
+}
+
 impl<'a> Search<'a> {
     fn new(orders: &'a [Order<'a>], tolerance: f64, below: f64) -> Self {
         let is_round = orders.iter().any(|order| order.surface.round_side().is_some());
@@ -156,7 +164,7 @@ impl<'a> Search<'a> {
         if !self.orders.is_empty() {
             self.push_whole(0);
         }
-        let bound = self.rest(0, max_parts, false);
+        let bound = self.rest(max_parts);
         let within = self.least() - self.tolerance;
         let (lower_bound, converged) = (bound.min(within) - self.beside, bound >= within);
         let least = self.best.map(|(distance, order, lowest)| Least {
@@ -169,36 +177,53 @@ impl<'a> Search<'a> {
         Below { least, lower_bound, converged }
     }
 
-    /// Searches open parts, of which there have been `parts`. From the first large batch on, the
-    /// search runs in the pool. Returns a lower bound of what it leaves.
-    fn rest(&mut self, mut parts: u64, max_parts: u64, is_in_pool: bool) -> f64 {
+    /// Searches open parts; from the first large batch on, in the pool. Returns a lower bound of what it
+    /// leaves.
+    fn rest(&mut self, max_parts: u64) -> f64 {
+        let mut parts = 0;
         loop {
-            if self.best.is_some_and(|(distance, ..)| distance <= self.enough) {
-                return self.bound_of_the_rest(self.open.least());
-            }
-            let overlap = self.least() <= 0.0;
-            let is_done = self.open.least().is_none_or(|bound| bound >= self.least() - self.tolerance);
-            if overlap || is_done {
-                for order in std::mem::take(&mut self.waiting) {
-                    self.push_whole(order);
+            match self.next(&mut parts, max_parts) {
+                Next::Done(bound) => return bound,
+                Next::Batch(batch) if batch.len() >= FEW => {
+                    return in_pool(|| self.rest_from(batch, parts, max_parts));
                 }
+                Next::Batch(batch) => self.search_all(batch),
             }
-            let batch = self.batch();
-            if batch.is_empty() {
-                return f64::INFINITY;
-            }
-            parts += batch.len() as u64;
-            if parts > max_parts {
-                return self.bound_of_the_rest(batch.iter().map(|(bound, _)| *bound));
-            }
-            if batch.len() >= FEW && !is_in_pool {
-                return in_pool(|| {
-                    self.search_all(batch);
-                    self.rest(parts, max_parts, true)
-                });
-            }
-            self.search_all(batch);
         }
+    }
+
+    /// The same from a batch on, where there have been `parts`.
+    fn rest_from(&mut self, mut batch: Vec<(f64, Open)>, mut parts: u64, max_parts: u64) -> f64 {
+        loop {
+            self.search_all(batch);
+            batch = match self.next(&mut parts, max_parts) {
+                Next::Done(bound) => return bound,
+                Next::Batch(batch) => batch,
+            };
+        }
+    }
+
+    /// The next parts, which are added to `parts`.
+    fn next(&mut self, parts: &mut u64, max_parts: u64) -> Next {
+        if self.best.is_some_and(|(distance, ..)| distance <= self.enough) {
+            return Next::Done(self.bound_of_the_rest(self.open.least()));
+        }
+        let overlap = self.least() <= 0.0;
+        let is_done = self.open.least().is_none_or(|bound| bound >= self.least() - self.tolerance);
+        if overlap || is_done {
+            for order in std::mem::take(&mut self.waiting) {
+                self.push_whole(order);
+            }
+        }
+        let batch = self.batch();
+        if batch.is_empty() {
+            return Next::Done(f64::INFINITY);
+        }
+        *parts += batch.len() as u64;
+        if *parts > max_parts {
+            return Next::Done(self.bound_of_the_rest(batch.iter().map(|(bound, _)| *bound)));
+        }
+        Next::Batch(batch)
     }
 
     /// Searches the parts of a batch.
