@@ -199,7 +199,8 @@ impl<'a> Iterate<'a> {
                 let of = lines.pushing(k);
                 let push = self.states[of].force;
                 let (bundle, state) = (&lines.bundles[k], &mut self.states[k]);
-                let local = Local::new(bundle, state, push, &relative, limits, k, self.centre, width);
+                let limit = bundle.slip.as_ref().map_or(Lanes::ZERO, |slip| limits.of(k, slip, push));
+                let local = Local::new(bundle, state, &relative, limit, self.centre, width);
                 if bundle.slip.is_some() {
                     state.friction = two(|k| -(local.slip.limit * local.slip.share[k]));
                 }
@@ -474,16 +475,13 @@ impl<'a> Iterate<'a> {
 }
 
 impl Local {
-    /// Of bundle `k`, whose friction follows `push`.
+    /// Of a bundle whose friction is at most `limit`.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "what an iteration has at hand")]
     fn new(
         bundle: &Bundle,
         state: &State,
-        push: Lanes,
         relative: &[f64; 6],
-        limits: &Limits,
-        k: usize,
+        limit: Lanes,
         centre: f64,
         width: f64,
     ) -> Self {
@@ -497,7 +495,6 @@ impl Local {
         let slip = bundle.slip.as_ref().map_or(Slipping::default(), |slip| {
             let [x, y] = slip.change(relative);
             let u = [slip.way[0] + x, slip.way[1] + y];
-            let limit = limits.of(k, slip, push);
             // A spring sticks as softly as it pushes.
             let least = (slip.scale * width).max(limit * bundle.compliance * 0.5);
             let width = (Lanes::splat(centre) / limit).max(least);
