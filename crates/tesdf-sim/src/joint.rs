@@ -1,5 +1,6 @@
 //! Joints between two bodies, or a body and the world, and the motors that drive them.
 use std::f64::consts::{PI, TAU};
+use std::fmt;
 
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -93,6 +94,20 @@ pub enum Drive {
     },
     /// A force, N, or torque, N m. Its magnitude is bounded by the motor's limit.
     Force(f64),
+}
+
+impl fmt::Display for Drive {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Velocity(x) => write!(f, "velocity {x}"),
+            Self::Position(x) => write!(f, "position {x}"),
+            Self::Force(x) => write!(f, "force {x}"),
+            Self::Spring { rest, stiffness, damping, velocity, force } => write!(
+                f,
+                "a spring of rest {rest}, stiffness {stiffness}, damping {damping}, velocity {velocity}, force {force}"
+            ),
+        }
+    }
 }
 
 impl Joint {
@@ -224,7 +239,7 @@ impl Joint {
             };
             if !values.iter().all(|x| x.is_finite()) || !positive {
                 return Err(format!(
-                    "its motor has {drive:?}; expected finite numbers, of a spring also 0 or greater, not both 0"
+                    "its motor has {drive}; expected finite numbers, of a spring also 0 or greater, not both 0"
                 ));
             }
         }

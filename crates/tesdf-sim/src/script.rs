@@ -279,11 +279,13 @@ impl Script {
         for keyframe in &self.keyframes {
             last.force = keyframe.force.map_or(last.force, DVec3::from_array);
             last.torque = keyframe.torque.map_or(last.torque, DVec3::from_array);
-            if !last.force.is_finite() || !last.torque.is_finite() {
-                return Err(format!(
-                    "the keyframe at {} s has {last:?}; expected finite numbers",
-                    keyframe.time
-                ));
+            for (key, value, unit) in [("force", last.force, "N"), ("torque", last.torque, "N m")] {
+                if !value.is_finite() {
+                    return Err(format!(
+                        "the keyframe at {} s has {key} {value}; expected finite numbers, {unit}",
+                        keyframe.time
+                    ));
+                }
             }
             wrenches.push(last);
         }

@@ -476,7 +476,23 @@ fn joints_that_do_not_fit_are_refused() {
         ),
         (
             Joint { motor: Some(Motor { drive: Drive::Position(f64::NAN), ..motor }), ..good.clone() },
-            "expected finite numbers",
+            "its motor has position NaN; expected finite numbers",
+        ),
+        (
+            Joint {
+                motor: Some(Motor {
+                    drive: Drive::Spring {
+                        rest: 0.0,
+                        stiffness: -2.0,
+                        damping: 1.0,
+                        velocity: 0.0,
+                        force: 0.0,
+                    },
+                    ..motor
+                }),
+                ..good.clone()
+            },
+            "its motor has a spring of rest 0, stiffness -2, damping 1",
         ),
         (
             Joint { kind: JointKind::Ball, limits: Some([0.1, 1.0]), ..good.clone() },
