@@ -82,8 +82,7 @@ fn face_tree(tree: &AabbTree, cube: &DomainCube) -> (Vec<[f32; 12]>, Vec<[u32; 2
     };
     let mut nodes = tree.nodes().to_vec();
     if let (bounds, Child::Leaf { start, end }) = tree.root() {
-        // A tree that is a single leaf is written as a node with two leaves. Of a single face, both
-        // leaves have the face.
+        // A tree that is a single leaf, of two faces or more, is written as a node with two leaves.
         let half = start + (end - start) / 2;
         nodes.push([(bounds, Child::Leaf { start, end: half }), (bounds, Child::Leaf { start: half, end })]);
     }

@@ -91,6 +91,9 @@ impl Presentation {
             SurfaceFaces::All => (0..).zip(&classes).map(|(f, c)| (f, is_inward(*c))).collect(),
             SurfaceFaces::Boundary => boundary(mesh, &classes, hairs),
         };
+        if kept.is_empty() {
+            return by_rule();
+        }
         // A face without area is not known, and changes no winding number.
         let is_whole = |&(f, _): &(u32, bool)| {
             matches!(classes[f as usize], FaceClass::Outward | FaceClass::Inward | FaceClass::Unknown)
@@ -141,36 +144,43 @@ impl Presentation {
     /// The faces of the surface of the mesh, and what tells their sides. `is_simple`: all faces are
     /// an embedded manifold with winding number 0 or 1 everywhere.
     pub fn of<'a>(&self, solid: &'a TriangleMesh, is_simple: bool) -> Result<Presented<'a>, MeshError> {
-        let Self { telling, faces, is_simple: own, .. } = self;
+        let &Self { mut telling, ref faces, is_simple: own, .. } = self;
         let all = solid.faces();
-        let (mesh, ids) = match faces {
-            Faces::All => match all {
-                // A tree has two leaves at least. A face and its reverse enclose nothing, as one
-                // face does.
-                &[[a, b, c]] => {
-                    let both = vec![[a, b, c], [a, c, b]];
-                    let both = TriangleMesh::new(solid.vertices().to_vec(), both)?;
-                    (Cow::Owned(both), Some(vec![0, 0]))
-                }
-                _ => (Cow::Borrowed(solid), None),
-            },
+        let (mut mesh, mut ids) = match faces {
+            Faces::All => (Cow::Borrowed(solid), None),
             Faces::Some(some) => {
-                let ids = some.iter().map(|(face, _)| *face).collect();
+                let ids: Vec<u32> = some.iter().map(|(face, _)| *face).collect();
                 (Cow::Owned(part(solid, some)?), Some(ids))
             }
         };
+        // A tree has two leaves at least. A face and its reverse enclose nothing, as one face does.
+        let single = match mesh.faces() {
+            &[face] => Some(face),
+            _ => None,
+        };
+        if let Some([a, b, c]) = single {
+            let both = vec![[a, b, c], [a, c, b]];
+            mesh = Cow::Owned(TriangleMesh::new(solid.vertices().to_vec(), both)?);
+            ids = Some(vec![ids.map_or(0, |ids| ids[0]); 2]);
+            if telling == Telling::Rule {
+                telling = Telling::RuleUnoriented;
+            }
+        }
         let sign_faces = match (telling, faces) {
             (Telling::Rule | Telling::RuleUnoriented, Faces::Some(some)) => {
-                // A face that is turned round counts -1, and twice more as it was: 1 in all.
+                // A face that is turned round counts -1, and twice more as it was: 1 in all. One that
+                // has its reverse counts 0.
                 let mut times = vec![1; all.len()];
-                some.iter().for_each(|&(f, turned)| times[f as usize] = if turned { 2 } else { 0 });
+                if single.is_none() {
+                    some.iter().for_each(|&(f, turned)| times[f as usize] = if turned { 2 } else { 0 });
+                }
                 all.iter().zip(times).flat_map(|(f, n)| std::iter::repeat_n(*f, n)).collect()
             }
             _ => Vec::new(),
         };
         // The check of a mesh that is presented as it is has told this.
-        let is_simple = *own && (!matches!(faces, Faces::All) || is_simple);
-        Ok(Presented { mesh, ids, telling: *telling, sign_faces, is_simple })
+        let is_simple = own && (!matches!(faces, Faces::All) || is_simple);
+        Ok(Presented { mesh, ids, telling, sign_faces, is_simple })
     }
 
     /// Whether a face of the mesh is a face of the surface.

@@ -1,6 +1,8 @@
 //! Every rule of what is inside: signed distances, sides, verification and proof against brute force
 //! over all faces.
 
+use std::ops::ControlFlow;
+
 use crate::support::brute_inside::BruteInside;
 use crate::support::meshes::encoded;
 use crate::support::parts::Turn::{Inward, Outward};
@@ -72,18 +74,19 @@ fn assert_exact(mesh: &TriangleMesh, asset: &TeSdf, brute: &BruteInside, n: usiz
             assert_eq!(asset.is_inside(p), inside, "{p}");
         }
     }
-    let report =
-        verify(asset, &VerifyOptions { samples: 2000, seed: 3 }, |_| std::ops::ControlFlow::Continue(()))
-            .expect("verifies");
-    assert!(report.passed, "{report:#?}");
-    let proof =
-        prove(asset, &ProveOptions::default(), |_| std::ops::ControlFlow::Continue(())).expect("a proof");
-    assert!(proof.proved, "{proof:#?}");
-
+    assert_verified(asset);
     let again = TeSdf::from_bytes(asset.as_bytes()).expect("opens");
     again.verify_checksums().expect("intact");
     assert_eq!(again.inside(), asset.inside());
     assert_eq!(again.query_batch(&all[..200]), answers[0][..200]);
+}
+
+fn assert_verified(asset: &TeSdf) {
+    let options = VerifyOptions { samples: 2000, seed: 3 };
+    let report = verify(asset, &options, |_| ControlFlow::Continue(())).expect("verifies");
+    assert!(report.passed, "{report:#?}");
+    let proof = prove(asset, &ProveOptions::default(), |_| ControlFlow::Continue(())).expect("a proof");
+    assert!(proof.proved, "{proof:#?}");
 }
 
 fn assert_rule(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
@@ -375,6 +378,31 @@ fn faces_partly_within_the_solid_stay_and_the_sign_counts_all_faces() {
     let middle = DVec3::new(0.35, 0.0, 0.0);
     let [boundary, all] = [asset.signed_distance(middle), encode(&spheres, Winding).signed_distance(middle)];
     assert!(boundary < all - 0.05, "{boundary} {all}");
+}
+
+/// A cube that is folded and inside out: its faces 0 and 11 lie on each other, and the inside is the
+/// 1e-31 between them.
+#[test]
+fn a_boundary_of_one_face_is_stored_with_both_sides() {
+    let vertices = [
+        DVec3::ZERO,
+        DVec3::X,
+        DVec3::Y,
+        DVec3::new(-1.0, -0.75, 0.5),
+        DVec3::new(1.8186903903260827, 1e-31, -5.0000000000000005e-61),
+        DVec3::new(0.925, -0.3, 1.3),
+        DVec3::new(-0.25, -0.75, -0.75),
+        DVec3::ONE,
+    ];
+    let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let mesh = TriangleMesh::new(vertices.to_vec(), faces).expect("a mesh");
+    let inside = Inside { rule: Winding, surface: SurfaceFaces::Boundary };
+    let asset = encoded(&SolidMesh::with_inside(mesh.clone(), inside).expect("a solid"));
+    let ids: Vec<u32> = (0..asset.face_count()).map(|at| asset.face_id(at)).collect();
+    assert_eq!(ids, [11, 11]);
+    // Points that lie on the fold itself may be on either side of it.
+    assert_verified(&asset);
 }
 
 proptest! {
