@@ -226,3 +226,41 @@ fn why_explains_found_and_missing_contacts() {
     let (code, _, error) = folder.tesdf(&[&apart[..], &["1:99"]].concat());
     assert!(code == Some(2) && error.contains("face is 99 (of 12)"), "{error}");
 }
+
+#[test]
+fn why_prints_the_verdict_of_each_stage() {
+    let folder = cube();
+    let (above, turned) = ("0.5 0.25 1.875 0 0 0 1", "0.5 0.25 1.8 0.36 0.48 0 0.8");
+    let cases: [(&str, &[&str], &[&str]); 4] = [
+        (
+            above,
+            &["--mode", "node"],
+            &[
+                "nodes of instance 0 in the field of instance 1",
+                "pair: tested; contact distance 0e0",
+                "broad phase: 8 candidates of 8 nodes",
+                "candidate; smallest signed distance -1.25e-1; 1 contact of 1 polygon",
+                "1 corner: -1.25e-1 at (2.000000e0 2.000000e0 2.000000e0), contact",
+                "no cell, 1 corner: 2.5e-1 at (2.000000e0 0.000000e0 2.000000e0), dropped: its cell is beyond",
+            ],
+        ),
+        (
+            above,
+            &[],
+            &[
+                "faces of instance 1 in the field of instance 0",
+                "at (2.500000e0 2.500000e-1 1.875000e0), dropped: beyond the contact distance",
+                "and 2 more; --json prints all",
+            ],
+        ),
+        (above, &["--cos-theta", "1"], &["dropped by the cosine filter: 0.0000", "; 0 contacts of "]),
+        (turned, &["--contacts-per", "minimum"], &["dropped: the surface is lower beside it"]),
+    ];
+    for (pose, more, expected) in cases {
+        let text =
+            folder.good(&[&["collide", "c.tesdf", "c.tesdf", "--pose-b", pose, "--why"], more].concat());
+        for part in expected {
+            assert!(text.contains(part), "{more:?}: expected {part} in {text}");
+        }
+    }
+}
