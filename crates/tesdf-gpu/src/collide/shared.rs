@@ -11,8 +11,8 @@ use crate::device::Device;
 use crate::islands::IslandSolver;
 
 /// A [`Detector`] with default options that threads share. It uploads shapes with the first scene,
-/// and detects for one thread after the other. For a simulation, it also solves contact problems on a
-/// CUDA device.
+/// and detects for one thread after the other. For a simulation, it also solves contact problems on
+/// a CUDA device.
 pub struct SharedDetector {
     device: Device,
     solver: Option<IslandSolver>,

@@ -31,7 +31,8 @@ pub const SCALARS: usize = 6;
 /// Numbers of a body: mass; inertia and inverse inertia, each xx, yy, zz, xy, xz, yz; inverse mass;
 /// velocity without rows; velocity of the guess; lever.
 pub const BODY: usize = 27;
-/// Words of a group: its body, the other one or [`NONE`], its first run, and the number of its runs.
+/// Words of a group: its body, the other one or [`NONE`], its first run, and the number of its
+/// runs.
 pub const GROUP: usize = 4;
 /// Words of a run: its first row, the row after its last one, whether its rows have friction, and
 /// its group.
@@ -76,13 +77,13 @@ pub const FORCES: usize = 3;
 /// Problems in the arrays that a device reads.
 ///
 /// A header has the places of its island in `words`, `numbers` and `results`, the numbers of its
-/// bodies, groups, runs and rows, whether it has a guess, whether it has friction, and the numbers of
-/// runs, rows and entries of matrices before it.
+/// bodies, groups, runs and rows, whether it has a guess, whether it has friction, and the numbers
+/// of runs, rows and entries of matrices before it.
 ///
 /// `words`: for each body and the end, the place of its groups in the last list; [`GROUP`] for each
 /// group; [`RUN`] for each run; for each row, the row whose push limits its friction; the groups of
-/// bodies, with one bit for the side of the body. `numbers`: [`SCALARS`]; [`BODY`] for each body; the
-/// offset of each group; the [`field`]s of all rows. `results`: [`REPORT`]; six for each body;
+/// bodies, with one bit for the side of the body. `numbers`: [`SCALARS`]; [`BODY`] for each body;
+/// the offset of each group; the [`field`]s of all rows. `results`: [`REPORT`]; six for each body;
 /// [`FORCES`] arrays over the rows.
 #[derive(Clone, Debug, Default)]
 pub struct Packed {

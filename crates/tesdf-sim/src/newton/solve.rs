@@ -119,8 +119,8 @@ impl Newton {
                         self.tamed(step, island, rows, posed, found)
                     }
                 };
-                // One thread computes each minimum, and they are collected in order: the bits do not
-                // depend on the number of threads.
+                // One thread computes each minimum, and they are collected in order: the bits do
+                // not depend on the number of threads.
                 match islands.len() > 1 && rows.len() >= ON_ONE_THREAD {
                     true => islands.par_iter().map(minimum).collect::<Vec<_>>(),
                     false => islands.iter().map(minimum).collect(),

@@ -168,8 +168,8 @@ impl Presentation {
         }
         let sign_faces = match (telling, faces) {
             (Telling::Rule | Telling::RuleUnoriented, Faces::Some(some)) => {
-                // A face that is turned round counts -1, and twice more as it was: 1 in all. One that
-                // has its reverse counts 0.
+                // A face that is turned round counts -1, and twice more as it was: 1 in all. One
+                // that has its reverse counts 0.
                 let mut times = vec![1; all.len()];
                 if single.is_none() {
                     some.iter().for_each(|&(f, turned)| times[f as usize] = if turned { 2 } else { 0 });

@@ -380,8 +380,8 @@ fn faces_partly_within_the_solid_stay_and_the_sign_counts_all_faces() {
     assert!(boundary < all - 0.05, "{boundary} {all}");
 }
 
-/// A cube that is folded and inside out: its faces 0 and 11 lie on each other, and the inside is the
-/// 1e-31 between them.
+/// A cube that is folded and inside out: its faces 0 and 11 lie on each other, and the inside is
+/// the 1e-31 between them.
 #[test]
 fn a_boundary_of_one_face_is_stored_with_both_sides() {
     let vertices = [

@@ -602,8 +602,8 @@ fn begin_cold(problems: &Problems, memory: &mut Memory, island: Island, shares: 
     sync_cube();
 }
 
-/// Copies the momentum that velocities and forces leave to a direction, and adds what the changes of
-/// forces bring.
+/// Copies the momentum that velocities and forces leave to a direction, and adds what the changes
+/// of forces bring.
 #[cube]
 fn momentum_brought(
     problems: &Problems,
@@ -671,8 +671,8 @@ struct Heading {
     centre: f64,
 }
 
-/// Finds where an iteration goes, with the momentum that the predictor brings as the first direction:
-/// predictor, corrector, and a second correction where that goes farther.
+/// Finds where an iteration goes, with the momentum that the predictor brings as the first
+/// direction: predictor, corrector, and a second correction where that goes farther.
 #[cube]
 fn find_heading(
     problems: &Problems,

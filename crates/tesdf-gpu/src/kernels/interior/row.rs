@@ -225,7 +225,8 @@ impl Problems {
         }
     }
 
-    /// The change of the friction when the velocities stay, to ν of friction. `followed` is the change of the push that limits the friction.
+    /// The change of the friction when the velocities stay, to ν of friction. `followed` is the
+    /// change of the push that limits the friction.
     pub fn standing(&self, at: Slipping, followed: f64, centre: f64) -> Standing {
         let wider = (centre / at.limit).max(at.least) - at.width;
         let k = at.limit / (at.width + at.length);

@@ -123,8 +123,8 @@ impl Pair {
         memory.sum(island, self.first_run, 6u32 * column + row)
     }
 
-    /// What the momentum that begins at `from` of the sums of the group is for one of its bodies, its
-    /// component `k`.
+    /// What the momentum that begins at `from` of the sums of the group is for one of its bodies,
+    /// its component `k`.
     pub fn of_momentum(self, memory: &mut Memory, island: Island, from: u32, is_other: bool, k: u32) -> f64 {
         let mut value = memory.sum(island, self.first_run, from + k);
         if is_other {
@@ -229,8 +229,8 @@ pub fn assemble(problems: &Problems, memory: &mut Memory, island: Island) {
 }
 
 /// Factors the matrix in place: above and on the diagonal `U`, below it the numbers before they are
-/// divided by the diagonal. `exchanged` are the rows that were exchanged. Returns whether there is a
-/// factor.
+/// divided by the diagonal. `exchanged` are the rows that were exchanged. Returns whether there is
+/// a factor.
 #[cube]
 pub fn factor(memory: &mut Memory, island: Island, exchanged: &mut Shared<[u32]>) -> bool {
     let size = 6u32 * island.bodies;

@@ -177,8 +177,8 @@ impl<'a> Search<'a> {
         Below { least, lower_bound, converged }
     }
 
-    /// Searches open parts; from the first large batch on, in the pool. Returns a lower bound of what it
-    /// leaves.
+    /// Searches open parts; from the first large batch on, in the pool. Returns a lower bound of
+    /// what it leaves.
     fn rest(&mut self, max_parts: u64) -> f64 {
         let mut parts = 0;
         loop {
